@@ -1,13 +1,16 @@
-//! Folders of small files, each with a line that the program must print for it.
+//! Compares the program's output with files: one expected line for each small file in a folder, or
+//! a whole text.
 
 use std::{fs, path::Path};
 
-/// Compares `told(name)` for every file of a folder with the file's line in `sentences.txt` there.
-/// `SNAPSHOTS=overwrite` writes that file anew; then review the changes in git.
+/// For every file in a folder, compares `told(name)` with the line for this file in `sentences.txt`
+/// in the same folder. If the environment variable `SNAPSHOTS` is `overwrite`, `sentences.txt` is
+/// written anew; then review the changes in git.
 ///
 /// # Panics
 ///
-/// If a line differs or has no file, showing both; if the folder has no file.
+/// If a line differs (the message shows both lines), if a line has no file, or if the folder has no
+/// file.
 pub fn is_as_it_should(folder: &Path, told: impl Fn(&str) -> String) {
     let entries = fs::read_dir(folder).expect("a folder of the corpus");
     let mut names: Vec<String> = entries
@@ -20,12 +23,13 @@ pub fn is_as_it_should(folder: &Path, told: impl Fn(&str) -> String) {
     is_in_file(&folder.join("sentences.txt"), &all);
 }
 
-/// Compares a text with a file, line by line. `SNAPSHOTS=overwrite` writes the file anew; then
-/// review the changes in git.
+/// Compares a text with a file, line by line. If the environment variable `SNAPSHOTS` is
+/// `overwrite`, the file is written anew; then review the changes in git.
 ///
 /// # Panics
 ///
-/// If they differ, with the lines that do; if the file cannot be read or written.
+/// If text and file differ (the message shows the lines that differ), or if the file cannot be read
+/// or written.
 #[track_caller]
 pub fn is_in_file(file: &Path, text: &str) {
     if std::env::var("SNAPSHOTS").is_ok_and(|what| what == "overwrite") {

@@ -1,7 +1,8 @@
-//! Tolerances, reference vectors, folders of invalid files, and access to measured data, shared by
-//! the tests of the workspace.
+//! Helpers of the workspace's tests: tolerances, reference vectors, comparisons with expected
+//! output, random numbers, and access to measured data.
 //!
-//! Every tolerance has a name and a reason. Tests do not contain bare numbers.
+//! Every tolerance in [`tolerance`] has a name and a reason. Tests use these names instead of bare
+//! numbers where they can.
 
 pub mod corpus;
 pub mod measured;

@@ -1,13 +1,13 @@
-//! Measured data sets of other authors. The project does not contain them, but its tests and
-//! examples use them if they are available.
+//! Finds measured data sets of other authors. The repository does not contain them, but its tests
+//! and examples use them if they are available.
 
 use std::{
     env,
     path::{Path, PathBuf},
 };
 
-/// Returns the folder with measured data sets: `STRETCH_DATA`, otherwise `../shared/data` next to
-/// the workspace.
+/// Returns the folder with measured data sets: the value of the environment variable
+/// `STRETCH_DATA`, or else `../shared/data` relative to the workspace.
 pub fn root() -> PathBuf {
     let beside = || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     env::var_os("STRETCH_DATA").map_or_else(beside, PathBuf::from)
@@ -16,8 +16,7 @@ pub fn root() -> PathBuf {
 /// Returns the folder of one data set. A test that calls this is `#[ignore]`d; `./ci.sh` runs it if
 /// the data are available.
 ///
-/// # Panics
-/// If the folder does not exist, with advice.
+/// # Panics If the folder does not exist. The message says where to get the data.
 ///
 /// ```should_panic
 /// testkit::measured::folder("nobody_recorded_this");

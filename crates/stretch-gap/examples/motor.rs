@@ -1,5 +1,6 @@
-//! A simulator of a motor with a gear, and synthetic measurements of a bench whose friction and
-//! backlash have other forms than the simulator's.
+//! Diagnoses a simulator of a motor with a gear. The measurements are synthetic: they come from a
+//! second model, the bench, whose friction and backlash have other forms than those in the
+//! catalogue.
 use stretch_gap::*;
 const SAMPLES: usize = 3000; // of each of two trials; the second is tested on
 
@@ -55,8 +56,9 @@ fn main() -> Result<(), GapError> {
         trials: vec![trial("monday", 0.0, false), trial("tuesday", 60.0, true)],
         dt_s: 0.01,
     })?;
-    // The bench: its friction is smooth in the speed and 20 % higher near standstill. Within the
-    // backlash, the load still follows the shaft by 2 % of their difference per sample.
+    // The bench: its friction is a smooth function of the speed and 20 % higher near standstill.
+    // Within the backlash, the load still follows the shaft: per sample by 2 % of the difference
+    // between the two.
     let mut motor = Motor { description, volts: vec![], angle: vec![], measured: [vec![], vec![]] };
     let (mut speed, mut angle, mut load, mut seed) = (0.0_f64, 0.0_f64, 0.0, 1_u64);
     for i in 0..2 * SAMPLES {

@@ -178,7 +178,8 @@ struct Searched<'a> {
     eliminated: Vec<(usize, Hypothesis)>,
     /// Every set that was fitted.
     tried: BTreeMap<Vec<usize>, Hypothesis>,
-    /// Screening results around the re-tuned nominal simulator, if they were kept.
+    /// Results of the screening (a first test of every effect) around the re-tuned nominal
+    /// simulator, if they were kept.
     looked: Option<Arc<Looked>>,
     /// Whether the search ended because one of its simulations failed.
     is_lost: bool,
@@ -209,9 +210,9 @@ impl<'a> Searched<'a> {
         effects.filter(|(e, _)| is_new(e)).map(|(_, spec)| spec.name.clone()).collect()
     }
 
-    /// Returns the effects that could not be examined because simulations failed: those in no
-    /// fitted set, and those whose fitted sets could not be judged. If the search itself failed,
-    /// returns all effects in no fitted set.
+    /// Returns the effects that could not be examined because simulations failed: those that could
+    /// not be fitted, and those whose fitted sets could not be run on the test trials. If the
+    /// search itself failed, returns all effects that are in no fitted set.
     fn lost(&self, weighed: &[Candidate]) -> Vec<String> {
         let not_looked_at = self.not_looked_at();
         if self.is_lost {
@@ -228,9 +229,9 @@ impl<'a> Searched<'a> {
     }
 }
 
-/// Searches for the best set of effects. The search is repeated if re-tuning from the best set's
-/// parameters, without its effects, ends lower, or if the nuisances re-estimated with the best set
-/// differ.
+/// Searches for the best set of effects. The search is repeated in two cases: if re-tuning without
+/// effects, started at the parameters of the best set, ends at a lower cost, or if the nuisances
+/// re-estimated with the best set differ from those used so far.
 fn search<'a>(
     task: Task<'a>,
     problem: PreparedProblem<'a>,
@@ -270,8 +271,8 @@ fn search<'a>(
 
 /// Tests whether errors of the recording or of the rig file explain more than the best set of
 /// effects. Returns these errors, and the search result with the first of them in place of the set.
-/// Such an error has one parameter and leaves only noise. `None` if the set of effects explains
-/// more, or if no more runs may be made.
+/// Each of these errors has one parameter and leaves only noise. `None` if the set of effects
+/// explains more, or if no more runs may be made.
 fn doubt(
     task: Task<'_>,
     searched: &Searched<'_>,
@@ -326,7 +327,7 @@ struct Gathered {
     stabilities: Vec<EffectStability>,
     sanity: Sanity,
     location: Where,
-    /// Proposal for what the catalogue lacks, if it was computed already.
+    /// Proposed equation for what the catalogue lacks, if it was computed already.
     proposed: Option<Proposed>,
     /// Why the recording is insufficient to name effects, if it is.
     too_little: Option<TooLittle>,
@@ -536,8 +537,8 @@ fn report(
 /// Number of slices of the unexplained gap that are reported.
 const REPORTED_SLICES: usize = 3;
 
-/// Returns the share of the gap on the test trials that the first candidate leaves, and where the
-/// residual is largest.
+/// Returns the share of the gap on the test trials that the first candidate leaves, and the slices
+/// of the trials in which its residual is largest.
 fn unexplained(
     simulator: &dyn Simulator,
     evidence: &Evidence,

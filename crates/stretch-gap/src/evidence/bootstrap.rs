@@ -1,7 +1,9 @@
-//! Closed-gap fraction with an interval, by block bootstrap.
+//! Computes the closed-gap fraction (the share of the gap that a set of effects closes) with an
+//! interval, by block bootstrap.
 //!
-//! Residuals are correlated within blocks, which are drawn whole and with replacement (Kunsch 1989, doi 10.1214/aos/1176347265);
-//! the interval is that of the percentiles of the draws.
+//! Neighbouring residuals are correlated. Therefore whole blocks of samples are drawn, with
+//! replacement (Kunsch 1989, doi 10.1214/aos/1176347265). The ends of the interval are percentiles
+//! of the fractions in these draws.
 
 use crate::{
     fit::score::{gap, mean_square},
@@ -11,7 +13,8 @@ use crate::{
 /// Draws of the bootstrap.
 const DRAWS: usize = 400;
 
-/// Closed-gap fraction on the test blocks.
+/// Closed-gap fraction on the blocks of the test trials. `before` and `after` are the gaps without
+/// and with the effects, summed over channels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Closed {
     pub(crate) before: f64,
@@ -23,9 +26,10 @@ pub(crate) struct Closed {
     pub(crate) falls: bool,
 }
 
-/// Returns the closed-gap fraction CGF = 1 - sum max(0, excess after)/sum max(0, excess before)
-/// over the channels, and its interval. An excess is a reduced chi-square minus one. The same
-/// blocks are drawn for all channels.
+/// Returns the closed-gap fraction CGF = 1 - sum max(0, excess after)/sum max(0, excess before),
+/// summed over the channels, and its interval. An excess is a reduced chi-square minus one.
+/// `before` and `after` hold the reduced chi-square of each block by channel. The same blocks are
+/// drawn for all channels.
 pub(crate) fn closed_interval(before: &[Vec<f64>], after: &[Vec<f64>], seed: u64) -> Closed {
     let whole = |blocks: &[Vec<f64>]| -> f64 { blocks.iter().map(|b| gap(mean_square(b))).sum() };
     let closed = |before: f64, after: f64| {
@@ -66,8 +70,8 @@ mod tests {
     use approx::assert_relative_eq;
     use testkit::tolerance::F64_ROUNDING;
 
-    /// Mean squares of blocks around `mean`, each from ten independent squares: relative standard
-    /// deviation 0.45.
+    /// Returns random mean squares of blocks with the expectation `mean`. Each is computed from ten
+    /// independent squares, so its relative standard deviation is 0.45.
     fn blocks(mean: f64, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
         let square = |random: &mut RandomGenerator| random.gauss().powi(2);
         (0..count).map(|_| mean * (0..10).map(|_| square(random)).sum::<f64>() / 10.0).collect()
@@ -96,8 +100,8 @@ mod tests {
         assert_eq!((closed.after, closed.closed, closed.interval), (0.0, 1.0, [1.0; 2]));
     }
 
-    /// Without a gap before there is nothing to close, whatever is left; without a block there is
-    /// no result.
+    /// Without a gap before there is nothing to close, whatever is left. Without blocks, all
+    /// results are 0.
     #[test]
     fn nothing_is_closed_where_there_was_no_gap() {
         let worse = closed_interval(&[vec![0.9; 20]], &[vec![3.0; 20]], 1);
@@ -114,7 +118,8 @@ mod tests {
     }
 
     /// A second channel that is a copy of the first adds no evidence and removes none, because
-    /// blocks are drawn for both at once. The ratio of doubled gaps is the same to the bit.
+    /// blocks are drawn for both at once. Both gaps are doubled, so their ratio is the same to the
+    /// bit.
     #[test]
     fn channels_are_drawn_in_step() {
         let mut random = RandomGenerator::new(4, 0);
@@ -138,15 +143,16 @@ mod tests {
             (0..40).map(|_| width(count, random)).sum::<f64>()
         };
         let (few, many) = (mean(30, &mut random), mean(120, &mut random));
-        // Four times the blocks: half the width. A width from 400 draws is known to 7 %, the mean
-        // of forty to 2 %; the tolerance of a tenth is five of these.
+        // Four times as many blocks halve the width. A width from 400 draws is known to 7 %, and
+        // the mean of forty widths to 2 %. The tolerance of 10 % is five times that.
         assert!((few / many / 2.0 - 1.0).abs() < 0.1, "{few} {many}");
     }
 
     /// 95 % of 400 intervals should contain the true share. Percentile intervals of a ratio from
-    /// sixty blocks contain it in about 93 % (the draws are skewed, and narrower by sqrt(59/60)).
-    /// The lower limit is three standard deviations of the count, 5 each, below that. The upper
-    /// limit excludes intervals that always contain it.
+    /// sixty blocks contain it in about 93 % of the recordings, 372 of 400, because the draws are
+    /// skewed and narrower by sqrt(59/60). The lower limit of the test is three standard deviations
+    /// of the count (5 each) below 372. The upper limit excludes intervals that always contain the
+    /// true share.
     #[test]
     fn intervals_hold_the_true_share_as_often_as_they_say() {
         let truth = 1.0 - 1.0 / 5.0;
@@ -161,8 +167,8 @@ mod tests {
     }
 
     /// If nothing changed, the mean square falls significantly in 2.5 % of the recordings: 10 of
-    /// 400, standard deviation 3.1. Percentile intervals give about 12 (see the previous test). The
-    /// limit of 22 is three standard deviations above that.
+    /// 400, with a standard deviation of 3.1. Percentile intervals are too narrow and give about
+    /// 12. The limit of 22 is three standard deviations above 12.
     #[test]
     fn chance_is_seldom_confirmed() {
         let mut random = RandomGenerator::new(7, 0);

@@ -1,7 +1,9 @@
-//! Candidates, stages and parameters as the diagnosis lists them.
+//! Builds the lists of a diagnosis: candidates (sets of effects), gaps of the stages, and shifts of
+//! the parameters.
 //!
-//! A candidate's closed-gap fraction is 1 - sum_c max(0, e_c with its effects)/sum_c max(0, e_c re-tuned) of the excesses e_c of
-//! the channels on the test trials.
+//! The excess of a channel is its reduced chi-square minus one, here on the test trials. A
+//! candidate's closed-gap fraction is 1 - sum max(0, excess with its effects)/sum max(0, excess of
+//! the re-tuned nominal simulator), where both sums run over the channels.
 
 use std::collections::BTreeMap;
 
@@ -63,7 +65,8 @@ pub struct Candidate {
 
 impl Candidate {
     /// Whether the set leaves much more on the fitted trials than on the test trials: the root mean
-    /// square of [`left`](Self::left) is above 1.2 times that of [`gap_after`](Self::gap_after).
+    /// square residual of [`left`](Self::left) is more than 1.2 times that of
+    /// [`gap_after`](Self::gap_after).
     pub fn fits_worse(&self) -> bool {
         1.0 + self.left > 1.2 * 1.2 * (1.0 + self.gap_after)
     }
@@ -113,13 +116,13 @@ pub struct ParameterShift {
     pub is_evidence: bool,
 }
 
-/// Standard deviations to either side that hold 95 % of a Gaussian.
+/// Number of standard deviations on either side of the mean within which 95 % of a Gaussian lie.
 const COVERS: f64 = 1.96;
 
 /// Name of the candidate for any cause outside the catalogue.
 const UNKNOWN: &str = "unknown";
 
-/// A candidate, and its reduced chi-squares by stage and block.
+/// A candidate, and its reduced chi-squares: one [`Blocks`] per stage.
 pub(crate) type Held = (Candidate, Vec<Blocks>);
 
 /// Simulates every hypothesis on the test trials. Returns those that can be simulated, each with
@@ -142,15 +145,17 @@ pub(crate) fn candidates(
     Ok(held?.into_iter().flatten().unzip())
 }
 
-/// Smallest share of the gap that a set of effects must close to count as a cause; a `partial`
-/// answer promises this share. The gap, before and after, is the larger of those on fitted and test
-/// trials, because an effect that acts only in long trials leaves little gap in short ones.
+/// Smallest share of the gap that a set of effects must close to count as a cause; the verdict
+/// `partial` promises this share. Gaps without and with the effects are the larger of the gaps on
+/// fitted and on test trials, because the lack of an effect that acts only in long trials causes
+/// little gap in short ones.
 pub(crate) const LEAST_CLOSED: f64 = 0.3;
 
-/// Computes the posterior. Returns it with candidates and blocks in the order of its sets. A set of
-/// effects that closes less than [`LEAST_CLOSED`] of the gap is dropped. If every remaining set
-/// leaves more than noise and model discrepancy would, `function` is called with the set of the
-/// highest score, to compute one more hypothesis, a cause outside the catalogue.
+/// Computes the posterior. Returns it with the candidates and their blocks, in the order of the
+/// posterior's sets. A set of effects that closes less than [`LEAST_CLOSED`] of the gap is dropped.
+/// If every remaining set leaves more than noise and model discrepancy would, `function` is called
+/// with the set of the highest score. It computes one more hypothesis: a function of the recorded
+/// signals, which stands for a cause outside the catalogue.
 pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,
@@ -231,8 +236,9 @@ fn candidate(
     Ok((candidate, blocks))
 }
 
-/// Appends the candidate `unknown`. It has the score and the remaining excess of the function
-/// outside the catalogue; without such a function, score 0 and the whole gap.
+/// Appends the candidate `unknown`. Its score and remaining excess are those of the function that
+/// describes a cause outside the catalogue. Without such a function, its score is 0 and it leaves
+/// the whole gap.
 pub(crate) fn beside_unknown(
     mut candidates: Vec<Candidate>,
     gap: Excess,
@@ -286,12 +292,12 @@ fn interval(p: &EffectParameter, value: f64, sd: f64) -> [f64; 2] {
         true => [-COVERS, COVERS].map(|k| value * libm::exp(k * sd / value)),
         false => [-COVERS, COVERS].map(|k| value + k * sd),
     };
-    // A value outside of its range (a threshold that is off) extends the range.
+    // A value outside its range (a threshold that is off) extends the range.
     let (low, high) = (p.min.min(value), p.max.max(value));
     ends.map(|end| end.clamp(low, high))
 }
 
-/// The gap of every stage on the test trials.
+/// Returns the gap of every stage on the test trials.
 pub(crate) fn stage_gaps(problem: &PreparedProblem<'_>, evidence: &Evidence) -> Vec<StageGap> {
     let total: f64 = evidence.stages.iter().map(|s| s.excess_retuned.max(0.0)).sum();
     let one = |(stage, s): (usize, &StageEvidence)| {
@@ -314,7 +320,7 @@ pub(crate) fn stage_gaps(problem: &PreparedProblem<'_>, evidence: &Evidence) -> 
     evidence.stages.iter().enumerate().map(one).collect()
 }
 
-/// How far every parameter with a tolerance moved.
+/// Returns how far every parameter with a tolerance moved.
 pub(crate) fn shifts(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<ParameterShift> {
     let (fitted, bent) = (&evidence.best.parameters, &evidence.retuned.parameters);
     let all = simulator.parameters().iter().enumerate().filter(|(_, p)| p.sd > 0.0);
@@ -375,11 +381,12 @@ mod tests {
     fn what_is_left_where_it_was_fitted_counts_where_it_is_much_more() {
         let leaves =
             |gap_after, left| Candidate { gap_after, left, ..candidate("play", 1.0) }.fits_worse();
-        // root mean squares of 2.0 and 4.4, 2.0 and 2.2, 1.0 and 1.3
+        // An excess e is a root mean square of sqrt(1 + e): 2.0 and 4.4, 2.0 and 2.2, 1.0 and 1.3.
         assert_eq!([leaves(3.0, 18.4), leaves(3.0, 3.84), leaves(0.0, 0.69)], [true, false, true]);
     }
 
-    /// A threshold that is off may be outside of its range. The interval then ends at the value.
+    /// A threshold that is off may have a value outside its range. The interval then ends at that
+    /// value.
     #[test]
     fn a_value_outside_of_its_range_is_an_end() {
         let spec = EffectParameter::sized("threshold", "V", 1.0..=2.0).off_at(9.0);

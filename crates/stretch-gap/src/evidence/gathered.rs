@@ -1,9 +1,10 @@
-//! The evidence: every trial before and after, including the test trials, which have not been read
-//! before.
+//! Simulates every trial with the parameters as shipped, re-tuned, and with the best set of
+//! effects. This includes the test trials, which no earlier step has read.
 //!
 //! Noise is what no model could remove. If the best set leaves a reduced chi-square X < 1 over the
-//! fitted and held-out samples, the noise was overestimated. Its variance is then X times the
-//! estimate, and every excess (reduced chi-square minus one) is relative to it.
+//! fitted and held-out samples, the noise was overestimated. The variance of the noise is then
+//! taken as X times the estimate, and every excess (reduced chi-square minus one) is relative to
+//! this variance.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,7 +25,7 @@ use crate::{
     search::selection::Found,
 };
 
-/// One stage over the whole session, all trials concatenated.
+/// Outputs and residuals of one stage over the whole session, with all trials concatenated.
 #[derive(Debug, Clone)]
 pub struct StageEvidence {
     /// Output simulated with the parameters as shipped.
@@ -61,7 +62,7 @@ pub struct Excess {
     pub left: f64,
 }
 
-/// Everything that a report draws, except the measured channels, which the simulator holds.
+/// Everything that a report plots, except the measured channels, which are in the simulator.
 #[derive(Debug, Clone)]
 pub struct Evidence {
     /// Traces of every stage.
@@ -74,7 +75,7 @@ pub struct Evidence {
     pub best: Model,
     /// Multiple of the simulator's usual step of integration that every run took.
     pub step: f64,
-    /// Fitted model of every candidate, in the order of the diagnosis.
+    /// Fitted model of every candidate, in the order of the candidates in the diagnosis.
     pub candidates: Vec<Model>,
     /// One standard deviation of every re-tuned nominal parameter, 0 if it is exact.
     pub retuned_sd: Vec<f64>,
@@ -84,20 +85,21 @@ pub struct Evidence {
     pub(crate) best_sd: Vec<f64>,
     /// Reduced chi-square of the re-tuned nominal simulator by block, one entry per stage.
     pub(crate) nominal_blocks: Vec<Blocks>,
-    /// Variance of the noise by stage, relative to its estimate: see the module's head.
+    /// Variance of the noise by stage, relative to its estimate: see the module documentation.
     levels: Vec<f64>,
     /// The strongest effect of the best set.
     pub(crate) best_effect: Option<usize>,
     /// Size of the gap.
     pub(crate) gap: Excess,
-    /// Responses of the stage with the largest gap to the parameters of the best set; `None` unless
-    /// [requested](crate::Options::responses), or if no effect acts in it.
+    /// Responses of the stage with the largest gap to the parameters of the best set. `None` if
+    /// they were not [requested](crate::Options::responses), or if no effect of the set acts in
+    /// this stage.
     pub responses: Option<Responses>,
 }
 
-/// Reduced chi-square of a model in one stage by block. For fitted and held-out trials it is in
-/// variances of the estimated noise, for test trials in variances of the noise that the best set
-/// leaves.
+/// Reduced chi-square of a model in one stage, by block of samples. For fitted and held-out trials
+/// it is relative to the variance of the estimated noise, for test trials to that of the noise that
+/// the best set leaves.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Blocks {
     pub(crate) fit: Vec<f64>,
@@ -105,7 +107,8 @@ pub(crate) struct Blocks {
     pub(crate) test: Vec<f64>,
 }
 
-/// Output of a model over the whole session, its clean residual, and its reduced chi-square by block.
+/// Output of a model over the whole session, its residual without nuisances, and its reduced
+/// chi-square by block.
 struct Traces {
     output: Vec<f64>,
     residual: Vec<f64>,
@@ -134,8 +137,9 @@ impl Traces {
     }
 }
 
-/// A difference of outputs in multiples of the noise, and the same without the most likely
-/// nuisances and without the unfitted spectral lines of a model. Both are linear in the difference.
+/// Returns a difference of outputs in multiples of the noise, first as it is, then without the most
+/// likely nuisances. From the test trials, the spectral lines of the model, which were not fitted
+/// there, are removed in both. Both results are linear in the difference.
 pub(crate) fn held_out(
     problem: &PreparedProblem<'_>,
     stage: usize,
@@ -158,9 +162,10 @@ pub(crate) fn held_out(
     (whole, residual)
 }
 
-/// Mean r V^-1 r by block. V^-1 r is the residual without its most likely nuisances, so their
-/// improbability counts as well. Means are over measured samples, whose noise `sd` is finite; a
-/// block without any is no gap.
+/// Returns the mean of r V^-1 r by block. V^-1 r is the residual r without its most likely
+/// nuisances. The product therefore includes the cost of improbable nuisances. Means are over
+/// measured samples, whose noise `sd` is finite. A block without measured samples has the value 1,
+/// which is no gap.
 fn blocks_of(
     roles: &SampleRoles,
     role: Role,
@@ -183,7 +188,8 @@ fn blocks_of(
 }
 
 impl Evidence {
-    /// Runs the simulator as shipped, re-tuned and with the best set over every trial; candidates are not yet listed.
+    /// Runs the simulator as shipped, re-tuned and with the best set over every trial. The
+    /// candidates are added later.
     pub(crate) fn gather(problem: &PreparedProblem<'_>, found: &Found) -> Result<Self, GapError> {
         let mut stages = Vec::new();
         let mut nominal_blocks = Vec::new();
@@ -226,12 +232,12 @@ impl Evidence {
         })
     }
 
-    /// The gap that a hypothesis leaves on fitted and held-out trials, summed over stages.
+    /// Returns the gap that a hypothesis leaves on fitted and held-out trials, summed over stages.
     pub(crate) fn fitted_gap(&self, problem: &PreparedProblem<'_>, hypothesis: &Hypothesis) -> f64 {
         fitted(problem, &hypothesis.misfits, &self.levels)
     }
 
-    /// The gap of some misfits on fitted and held-out trials, summed over stages.
+    /// Returns the gap that these misfits make on fitted and held-out trials, summed over stages.
     pub(crate) fn gap_of(&self, problem: &PreparedProblem<'_>, misfits: &[Misfit]) -> f64 {
         fitted(problem, misfits, &self.levels)
     }
@@ -259,8 +265,8 @@ impl Evidence {
     }
 }
 
-/// Variance of a stage's noise relative to its estimate. Without an effect in the stage nothing
-/// shows that the estimate was too high.
+/// Returns the variance of a stage's noise relative to its estimate. It is 1 if no effect of the
+/// best set acts in the stage, because then nothing shows that the estimate was too high.
 fn level(problem: &PreparedProblem<'_>, best: &Hypothesis, stage: usize) -> f64 {
     let effects = problem.simulator().effects();
     let mut acting = best.effects.iter();
@@ -271,8 +277,8 @@ fn level(problem: &PreparedProblem<'_>, best: &Hypothesis, stage: usize) -> f64 
 }
 
 /// Computes the gap as shipped (on the test trials), re-tuned and with the best set. The last two
-/// are the larger of those on fitted and test trials, because a gap that only one of them shows is
-/// a gap.
+/// are the larger of the gaps on fitted and on test trials, because a gap that shows only on one
+/// kind of trials is a gap, too.
 fn gap(
     problem: &PreparedProblem<'_>,
     best: &Hypothesis,

@@ -1,19 +1,20 @@
 //! Computes the null band: the excess (reduced chi-square minus one) that noise alone leaves in
-//! data like these. An excess below it is chance. Above it something is missing, although it may be
-//! too faint to name.
+//! data like these. An excess within the band can be chance. If it is above the band, something is
+//! missing, although it may be too faint to name.
 //!
-//! Recordings in which nothing is missing are drawn for the given trials and noise. In the metric,
-//! the output's own noise is white whatever its nuisances are, so N samples leave a chi-square. The
-//! noise t of the measured input reaches the output as the simulator transmits it, however slow it
-//! is, and has the share u of the noise:
+//! Recordings in which nothing is missing are drawn for the given trials and noise. In the metric
+//! V, the output's own noise z is white whatever the nuisances are, so that N samples leave a
+//! chi-square variable with N degrees of freedom. The noise t is the part of the measured input's
+//! noise that the simulator transmits to the output. It may be slow, and has the share u of the
+//! noise's variance. The reduced chi-square of a drawn recording is
 //!
 //! ```text
 //! X = ((1 - u)|z|^2 + 2 g sqrt((1 - u) t'V^-1 t) + t'V^-1 t) / N,     z ~ N(0, I), g ~ N(0, 1)
 //! ```
 //!
-//! If the level of the own noise is an estimate, (1 - u) is known only to its relative standard
-//! deviation, and has the same error in all trials of a recording. Re-tuning would remove some of
-//! the excess. This is neglected, so the band errs on the wide side.
+//! If the level of the output's own noise is an estimate, (1 - u) is drawn with the relative
+//! standard deviation of this estimate; its error is the same in all trials of a recording.
+//! Re-tuning would remove some of the excess. This is neglected, so the band is rather too wide.
 
 use rayon::prelude::*;
 
@@ -27,13 +28,13 @@ use crate::{
     },
 };
 
-/// Records that are drawn, and the share of them that lies within the band.
+/// Number of recordings that are drawn, and the share of them that lies within the band.
 const RECORDS: usize = 40;
 const WITHIN: f64 = 0.95;
 
-/// Returns the excess below which 19 of 20 recordings with nothing missing stay. Like every gap, it
-/// is the larger of those on fitted and test trials, summed over stages. If no more runs may be
-/// made, all noise is assumed to be the outputs' own.
+/// Returns the excess below which 19 of 20 recordings with nothing missing stay. Like every gap, an
+/// excess is summed over stages, and is the larger of the sums over fitted and over test trials. If
+/// no more runs may be made, all noise is assumed to be the outputs' own.
 pub(crate) fn null_band(problem: &PreparedProblem<'_>, seed: u64) -> Result<f64, GapError> {
     let stages = 0..problem.compare.metrics.len();
     let arrives: Result<Vec<Vec<f64>>, GapError> =
@@ -68,7 +69,7 @@ fn excess(
         let level = (1.0 + known_to * random.gauss()).max(0.0);
         let own = level * (1.0 - share).max(0.0);
         let mut chance = |samples: f64| {
-            // The sum of N squares, nearly normal: mean N, variance 2N.
+            // The sum of N squares is nearly normal, with mean N and variance 2N.
             let white = own * (samples + (2.0 * samples).sqrt() * random.gauss());
             let other = arrives * samples;
             gap((white + 2.0 * random.gauss() * (own * other).sqrt() + other) / samples)

@@ -1,12 +1,14 @@
-//! One posterior over all causes of a gap: nothing, each set of effects, and a cause outside the
-//! catalogue.
+//! Computes one posterior over all explanations of a gap: nothing is missing, each set of effects,
+//! and a cause outside the catalogue.
 //!
-//! Scores S_h are log-likelihood ratios, in nats, of hypotheses whose forms are all approximate:
-//! the parameters are re-tuned within their tolerances, the effects are fitted, and each parameter
-//! is penalised. The gap that hypothesis h leaves is g_h. Noise, whose level is known only to
-//! within a share, and model discrepancy, at most a share of what h closes, leave a limited gap;
-//! any other cause leaves more. With D_h, the probability that noise and discrepancy leave as much
-//! as g_h,
+//! The score S_h of a hypothesis h is its log-likelihood ratio to the re-tuned nominal simulator,
+//! in nats. For the score, the parameters are re-tuned within their tolerances, the effects are
+//! fitted, and each parameter of an effect is penalised. The hypothesis leaves the gap g_h and
+//! closes c_h. Two causes can leave a small gap although h is true: noise, because its level is
+//! known only approximately, and model discrepancy, because the form of an effect is only
+//! approximately that of the rig. Together they leave about u + v c_h at most; any other cause may
+//! leave more. D_h is the probability that noise and discrepancy leave as much as g_h. The weights
+//! w of the hypotheses are
 //!
 //! ```text
 //! w_h = exp(S_h/t) D_h,     D_h = 1/(1 + o_h),     o_h = o (g_h/(u + v c_h))^(1/s),     c_h = max(g_retuned - g_h, 0)
@@ -14,31 +16,33 @@
 //! w_unknown = max(sum over h of exp(S_h/t) (1 - D_h), o exp(S_f/t) D_f),     t = T + rho g_best/g_retuned
 //! ```
 //!
-//! f is one more hypothesis, outside the catalogue: a [function](crate::evidence::term_sum) of what
-//! was recorded, used if no set leaves as little as noise and discrepancy would. It is penalised
-//! for its parameters and for the choice of its terms; o are the prior odds of a cause that the
-//! catalogue lacks. It is one form of "something else", so the larger of the two weights counts.
+//! Here o are the prior odds of a cause that the catalogue lacks. f is one more hypothesis, outside
+//! the catalogue: a [function](crate::evidence::term_sum) of the recorded signals, used if no set
+//! leaves as little as noise and discrepancy would. Its score is penalised for its parameters and
+//! for the choice of its terms. The function is one form of a cause outside the catalogue, so only
+//! the larger of the two terms of w_unknown counts.
 //!
-//! Probabilities are these weights as shares of their sum. The temperature t tempers the posterior
-//! (Grunwald and van Ommen 2017, doi 10.1214/17-BA1085): the more of the gap the best set leaves,
-//! the less its form is that of the rig, and the less a difference of scores means. T, rho, o, u, v
-//! and s are calibrated on development cases. If nothing is missing there is no model discrepancy,
-//! and noise alone leaves the gap. The gap is then normal with variance u^2 + b^2, from the
-//! uncertainty u of the noise level and the scatter by chance b, below which noise alone stays in
-//! 19 of 20 recordings. Any other cause leaves every gap with equal probability. Sets that explain
-//! less than 30 % of the gap are discarded; the gap is the larger of those on fitted and test
-//! trials. If the strongest effect of a set is at an end of its range, the odds o_h are ten times
-//! as large, because it may compensate for something else.
+//! Each probability is the weight of a hypothesis divided by the sum of all weights. The
+//! temperature t tempers the posterior (Grunwald and van Ommen 2017, doi 10.1214/17-BA1085): the
+//! larger the share of the gap that the best set leaves, the more its forms differ from those of
+//! the rig, and the less a difference of scores means. T, rho, o, u, v and s are calibrated on
+//! development cases. If nothing is missing, there is no model discrepancy, and noise alone causes
+//! the gap. The gap is then normal with the variance u^2 + b^2. Here u is the uncertainty of the
+//! noise level, and b the [null band](crate::evidence::null_band): the excess below which noise
+//! alone stays in 19 of 20 recordings. For any other cause, every size of the gap is assumed to be
+//! equally probable. Sets that explain less than 30 % of the gap are discarded. Every gap is the
+//! larger of the gaps on fitted and on test trials. If the strongest effect of a set is at an end
+//! of its range, the odds o_h are ten times as large, because it may compensate for something else.
 
 use crate::{
     fit::hypothesis::Hypothesis,
     problem::{simulator::Simulator, thresholds::Thresholds},
 };
 
-/// Probability that the 95 % set holds.
+/// Share of the probability that the 95 % set covers.
 const COVERED: f64 = 0.95;
 
-/// What the posterior needs of a hypothesis.
+/// The properties of a hypothesis on which the posterior depends.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Standing {
     /// Score against the re-tuned nominal simulator, nats.
@@ -51,7 +55,7 @@ pub(crate) struct Standing {
     pub(crate) is_nothing: bool,
 }
 
-/// A function of what was recorded, outside the catalogue, as the posterior needs it.
+/// A function of the recorded signals that describes a cause outside the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Function {
     /// Score against the re-tuned nominal simulator, nats.
@@ -60,12 +64,12 @@ pub(crate) struct Function {
     pub(crate) left: f64,
 }
 
-/// The gap that is to be explained.
+/// The gap that hypotheses have to explain.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Gap {
     /// Excess that the re-tuned simulator leaves.
     pub(crate) retuned: f64,
-    /// Excess that noise alone stays below in 19 of 20 records like this one.
+    /// Excess below which noise alone stays in 19 of 20 recordings like this one.
     pub(crate) null_band: f64,
 }
 
@@ -80,17 +84,18 @@ pub(crate) struct Weighed {
 /// The posterior.
 #[derive(Debug, Clone)]
 pub(crate) struct Posterior {
-    /// Sets of effects, the most probable first; the empty set, which says that nothing is missing,
-    /// comes last.
+    /// Sets of effects, the most probable first. The empty set, which stands for "nothing is
+    /// missing", comes last.
     pub(crate) sets: Vec<Weighed>,
     /// Probability of a cause outside the catalogue.
     pub(crate) unknown: f64,
-    /// The function that describes this cause, if it was requested.
+    /// The function that describes a cause outside the catalogue, if it was computed.
     pub(crate) function: Option<Function>,
 }
 
-/// The hypotheses that are weighed: the best set, the sets in which an alternative replaces one of
-/// its effects, the sets without its weakest effects, and the empty set.
+/// Returns the hypotheses that are weighed: the best set, the sets in which an alternative replaces
+/// one effect of the best set, the sets that remain when its weakest effects are removed, and the
+/// empty set.
 pub(crate) fn hypotheses(
     best: &Hypothesis,
     rivals: &[(usize, Hypothesis)],
@@ -116,8 +121,8 @@ pub(crate) fn hypotheses(
     all
 }
 
-/// The posterior of the module's head: the probability of every hypothesis, and of a cause outside
-/// the catalogue.
+/// Returns the posterior that the module documentation defines: the probability of every
+/// hypothesis, and of a cause outside the catalogue.
 pub(crate) fn probabilities(
     thresholds: &Thresholds,
     gap: Gap,
@@ -154,8 +159,9 @@ pub(crate) fn probabilities(
     (all, unknown / total)
 }
 
-/// Whether an effect is named: the cause is most probably in the catalogue, and the gap counts.
-/// Probabilities are those of effects, of nothing, and of a cause outside the catalogue.
+/// Whether effects are named: the cause is most probably in the catalogue, and the gap is large
+/// enough to count. The probabilities are those of effects, of nothing missing, and of a cause
+/// outside the catalogue.
 pub(crate) fn names(
     [effects, nothing, unknown]: [f64; 3],
     retuned: f64,
@@ -167,13 +173,13 @@ pub(crate) fn names(
 /// Two sets are equally probable if the ratio of their probabilities is at least this.
 const EVEN: f64 = 0.99;
 
-/// The most probable of some sets, and those that are equally probable, by index.
+/// Returns the indices of the most probable set and of all sets that are equally probable.
 pub(crate) fn most_probable(probabilities: &[f64]) -> Vec<usize> {
     let most = probabilities.iter().copied().fold(0.0, f64::max);
     (0..probabilities.len()).filter(|&i| probabilities[i] >= EVEN * most).collect()
 }
 
-/// Weighs hypotheses with their misfits.
+/// Computes the posterior of some hypotheses.
 pub(crate) fn weigh(
     thresholds: &Thresholds,
     gap: Gap,
@@ -194,7 +200,8 @@ pub(crate) fn weigh(
     Posterior { sets, unknown, function }
 }
 
-/// Excess that noise and model discrepancy may leave of a gap: u + v c of the module's head.
+/// Returns the excess that noise and model discrepancy may leave: u + v c_h in the module
+/// documentation.
 pub(crate) fn allowed(retuned: f64, left: f64, thresholds: &Thresholds) -> f64 {
     let closed = (retuned - left).max(0.0);
     thresholds.unknown_excess + thresholds.unknown_share * closed
@@ -203,15 +210,15 @@ pub(crate) fn allowed(retuned: f64, left: f64, thresholds: &Thresholds) -> f64 {
 /// Factor on the odds of something else if the strongest effect of a set is at an end of its range.
 const AT_BOUND: f64 = 10.0;
 
-/// Odds that another cause than noise and model discrepancy leaves as much: o_h of the module's
-/// head.
+/// Returns the odds that a cause other than noise and model discrepancy leaves as much: o_h in the
+/// module documentation.
 fn odds_of_else(retuned: f64, left: f64, thresholds: &Thresholds) -> f64 {
     let beyond = (left.max(f64::MIN_POSITIVE) / allowed(retuned, left, thresholds)).ln();
     thresholds.unknown_odds * (beyond / thresholds.unknown_soft).exp()
 }
 
-/// Odds that another cause than noise leaves as much if nothing is missing: o_nothing of the
-/// module's head.
+/// Returns the odds that a cause other than noise leaves as large a gap, for the hypothesis that
+/// nothing is missing: o_nothing in the module documentation.
 fn odds_beside_nothing(gap: Gap, thresholds: &Thresholds) -> f64 {
     let ratio = gap.retuned.max(0.0) / thresholds.unknown_excess.hypot(gap.null_band);
     thresholds.unknown_odds * ratio * (0.5 * (ratio * ratio - 1.0)).exp()
@@ -224,13 +231,13 @@ impl Posterior {
         empty.map(|w| w.probability).sum()
     }
 
-    /// Probability that effects of the catalogue are missing, whichever.
+    /// Probability that any effects of the catalogue are missing.
     pub(crate) fn effects(&self) -> f64 {
         1.0 - self.unknown - self.nothing()
     }
 }
 
-/// Number of probabilities, the largest first, that hold 95 % of their sum.
+/// Returns how many of the probabilities, which are in descending order, make up 95 % of their sum.
 pub(crate) fn covering(probabilities: &[f64]) -> usize {
     let all: f64 = probabilities.iter().sum();
     let mut sum = 0.0;
@@ -242,7 +249,8 @@ pub(crate) fn covering(probabilities: &[f64]) -> usize {
     held.count()
 }
 
-/// Effects of the smallest set of candidates that holds 95 % of the probability, the best candidate's first.
+/// Returns the effects of the smallest collection of candidates that has 95 % of the probability,
+/// those of the best candidate first.
 pub(crate) fn covering_set(weighed: &[Weighed], simulator: &dyn Simulator) -> Vec<String> {
     let mut names: Vec<String> = Vec::new();
     let held = covering(&weighed.iter().map(|w| w.probability).collect::<Vec<_>>());
@@ -280,12 +288,13 @@ mod tests {
         (hypothesis(effects, score), Standing { score, left, is_at_bound: false, is_nothing })
     }
 
-    /// A gap in a record in which chance leaves almost nothing.
+    /// Returns a gap in a recording in which noise alone leaves almost no excess.
     fn of_size(retuned: f64) -> Gap {
         Gap { retuned, null_band: 0.01 }
     }
 
-    /// A gap of ten times the noise's variance; sets of one effect with these scores and what each leaves.
+    /// Returns the posterior for a gap of ten times the noise's variance. `sets` holds the score
+    /// and the remaining excess of sets of one effect each.
     fn posterior(sets: &[(f64, f64)]) -> Posterior {
         let one = |(i, (score, left)): (usize, &(f64, f64))| fitted(&[i], *score, *left);
         let sets = sets.iter().enumerate().map(one).collect();
@@ -306,14 +315,14 @@ mod tests {
         assert!(all.sets.iter().all(|w| (0.0..=1.0).contains(&w.probability)));
     }
 
-    /// ln p_i/p_j = (S_i - S_j)/(T + rho share) if both leave the same.
+    /// ln p_i/p_j = (S_i - S_j)/(T + rho share) if both sets leave the same share of the gap.
     #[test]
     fn odds_are_the_tempered_likelihood_ratio() {
         let thresholds = Thresholds::frozen();
         for share in [0.0, 0.01, 0.3, 1.0] {
             let all = posterior(&[(100.0, 10.0 * share), (93.0, 10.0 * share)]);
             let temperature = thresholds.temperature + thresholds.rho * share;
-            // A logarithm of a ratio of two rounded exponentials.
+            // The tolerance is for the logarithm of a ratio of two rounded exponentials.
             let found = (all.sets[0].probability / all.sets[1].probability).ln();
             assert_relative_eq!(
                 found,
@@ -325,7 +334,7 @@ mod tests {
     }
 
     /// Of two sets with equal scores, the one that leaves less is more probable. If a set leaves
-    /// nothing, something else is improbable.
+    /// nothing, a cause outside the catalogue is improbable.
     #[test]
     fn what_leaves_less_is_the_more_probable() {
         let all = posterior(&[(100.0, 0.1), (100.0, 5.0)]);
@@ -335,7 +344,7 @@ mod tests {
         assert!(unknown[0] < 1e-6 && unknown[4] > 0.9, "{unknown:?}");
     }
 
-    /// An effect at the end of its range makes something else more probable.
+    /// An effect at the end of its range makes a cause outside the catalogue more probable.
     #[test]
     fn a_set_at_its_bound_may_stand_in_for_something_else() {
         let of = |is_at_bound, left| {
@@ -360,9 +369,9 @@ mod tests {
         assert!(of(0.02).nothing() > 0.9, "{:?}", of(0.02));
         let falling = [0.0, 0.05, 0.2, 0.4, 30.0].map(|gap| of(gap).nothing());
         assert!(falling.windows(2).all(|pair| pair[0] > pair[1]), "{falling:?}");
-        // A fifth more than noise of a known level, where chance leaves a hundredth.
+        // The gap is 0.2; noise alone stays below 0.01.
         assert!(of(0.2).unknown > 0.5, "{:?}", of(0.2));
-        // The same if chance alone leaves as much.
+        // The same gap, but noise alone reaches 0.3.
         let chance = Gap { retuned: 0.2, null_band: 0.3 };
         let short = weigh(&Thresholds::frozen(), chance, vec![fitted(&[], 0.0, 0.2)], None);
         assert!(short.nothing() > 0.8, "{short:?}");
@@ -405,7 +414,7 @@ mod tests {
     #[test]
     fn a_rival_stands_where_the_effect_stood_and_nothing_is_last() {
         let best = hypothesis(&[4, 2, 7], 100.0);
-        // The search lists the kept effects first and the new one last.
+        // The search lists the kept effects of the best set first and the new effect last.
         let rival = (2, hypothesis(&[4, 7, 5], 95.0));
         let less = [
             (7, hypothesis(&[4, 2], 60.0)),
@@ -424,7 +433,7 @@ mod tests {
         let thresholds = Thresholds::frozen();
         let of = |retuned: f64| odds_of_else(retuned, 1.0, &thresholds);
         assert!(of(2.0) > of(10.0) && of(10.0) > of(100.0));
-        // Odds at the border.
+        // At the excess that noise may leave, the odds equal the prior odds.
         let border = thresholds.unknown_excess;
         assert_relative_eq!(
             odds_of_else(border, border, &thresholds),

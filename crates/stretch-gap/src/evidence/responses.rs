@@ -1,4 +1,5 @@
-//! Computes how a stage responds to the parameters of its effects, with one run per value.
+//! Computes how the output of a stage changes with the parameters of its effects, with one run per
+//! parameter value.
 
 use rayon::prelude::*;
 
@@ -11,9 +12,10 @@ pub struct Responses {
     pub stage: usize,
     /// Every varied parameter, in the order of the effects.
     pub parameters: Vec<Response>,
-    /// Products under the metric of the noise, averaged over the blocks of the test trials: first
-    /// the residual of the best set, then every response in the order of parameters and values; row
-    /// by row, symmetric. The first is 1 + the excess.
+    /// Symmetric matrix of products x'V^-1 y in the metric V of the noise, per sample and averaged
+    /// over the blocks of the test trials. The first row belongs to the residual of the best set;
+    /// the others belong to the responses, in the order of parameters and values. The first element
+    /// is therefore 1 + the excess.
     pub products: Vec<Vec<f64>>,
 }
 
@@ -28,7 +30,8 @@ pub struct Response {
     pub unit: String,
     /// Fitted value.
     pub fitted: f64,
-    /// Other values, ascending, and the changes that they make.
+    /// Values other than the fitted one, in ascending order, and the changes of the output that
+    /// they make.
     pub answers: Vec<Answered>,
 }
 
@@ -37,10 +40,12 @@ pub struct Response {
 pub struct Answered {
     /// Value of the parameter.
     pub value: f64,
-    /// Output minus that of the fitted value, in the unit of the stage, all trials concatenated.
+    /// Output with this value minus output with the fitted value, in the unit of the output, with
+    /// all trials concatenated.
     pub output: Vec<f64>,
-    /// Change of the output in multiples of the noise, without slow drift and trial offsets: what
-    /// the value subtracts from [`residual_after`](crate::StageEvidence::residual_after).
+    /// The same change in multiples of the noise, without slow drift and trial offsets. With this
+    /// value, the residual is [`residual_after`](crate::StageEvidence::residual_after) minus this
+    /// change.
     pub residual: Vec<f64>,
 }
 
@@ -51,10 +56,10 @@ use crate::{
     problem::{error::GapError, sample_roles::Role},
 };
 
-/// Positions of the values: shares of the reach on either side of the fitted value.
+/// Distances of the values from the fitted value, as shares of the reach.
 const STEPS: [f64; 6] = [-1.0, -0.5, -0.25, 0.25, 0.5, 1.0];
-/// Reach in fitted values, or in standard deviations if that is more; for parameters on a
-/// logarithmic scale, a ratio.
+/// The reach is [`DEVIATIONS`] standard deviations, or the fitted value itself if that is more. For
+/// parameters on a logarithmic scale, the reach is a factor of [`RATIO`] in both directions.
 const DEVIATIONS: f64 = 3.0;
 const RATIO: f64 = 4.0;
 
@@ -67,8 +72,8 @@ struct Turned<'a> {
     values: Vec<f64>,
 }
 
-/// The responses of a stage around the best set; `None` if no parameter of an effect that is cheap
-/// to vary acts in the stage.
+/// Returns the responses of a stage around the best set; `None` if the set has no parameter that
+/// acts in the stage and is cheap to vary.
 pub(crate) fn responses(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,
@@ -109,7 +114,7 @@ pub(crate) fn responses(
     Ok(Some(Responses { stage, parameters: parameters.collect(), products }))
 }
 
-/// The parameters of a set's effects that act in a stage and are cheap to vary.
+/// Returns the parameters of a set's effects that act in a stage and are cheap to vary.
 fn turned<'a>(problem: &PreparedProblem<'a>, best: &Hypothesis, stage: usize) -> Vec<Turned<'a>> {
     let simulator = problem.simulator();
     let mut turned = Vec::new();
@@ -143,8 +148,9 @@ fn values(spec: &EffectParameter, fitted: f64, sd: f64) -> Vec<f64> {
     values
 }
 
-/// x' V^-1 y of every pair, averaged over the blocks of the test trials. `columns` hold x and V^-1
-/// x, in multiples of the noise; the actual noise variance is `level` times the assumed one.
+/// Returns x' V^-1 y of every pair of columns, averaged over the blocks of the test trials. Each
+/// element of `columns` holds x and V^-1 x, in multiples of the assumed noise; the actual noise
+/// variance is `level` times the assumed one.
 fn products(
     problem: &PreparedProblem<'_>,
     level: f64,
@@ -163,7 +169,7 @@ fn products(
         blocks.iter().map(|b| dot(&x[b.clone()], &y[b.clone()])).sum::<f64>() / samples / level
     };
     let row = |(i, (x, _)): (usize, &(&[f64], &[f64]))| -> Vec<f64> {
-        // V^-1 is symmetric up to rounding, so use one number per pair.
+        // V^-1 is symmetric up to rounding, so compute one number for both orders of a pair.
         let pair = |j: usize, y: &[f64]| match j < i {
             true => product(columns[j].0, columns[i].1),
             false => product(x, y),

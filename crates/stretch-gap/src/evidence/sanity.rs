@@ -1,19 +1,21 @@
-//! Checks whether the data can come from the simulator at all, for the judge, and whether the noise
-//! level is plausible, for a note.
+//! Makes two checks: whether the data can come from the simulated rig at all (the verdict depends
+//! on this), and whether the noise level is plausible (only a note depends on this).
 //!
 //! Two signs show that the data come from something other than the simulated rig:
 //!
-//! * *gross misfit*: on the test trials, more of a channel's variance is left than a missing effect
-//!   leaves ([`RecordFacts::gross_misfit_share`](crate::RecordFacts::gross_misfit_share)). The
-//!   cause is another rig, or a column that is not what its name says. The share is that of 1 - R^2
-//!   without the noise: (sum (y - y_sim)^2 - N s^2)/sum (y - mean y)^2;
+//! * *gross misfit*: on the test trials, a larger share of a channel's variance is left than a
+//!   missing effect could leave
+//!   ([`RecordFacts::gross_misfit_share`](crate::RecordFacts::gross_misfit_share)). The cause is
+//!   another rig, or a column that is not what its name says. The share is 1 - R^2 with the noise
+//!   subtracted: (sum (y - y_sim)^2 - N s^2)/sum (y - mean y)^2 for N samples y, the simulated
+//!   y_sim and the standard deviation s of the noise;
 //! * *at bounds*: two parameters of a stage are at the ends of their tolerances, and more than
-//!   noise is left. If the same two with wider tolerances explain as much without any effect, the
-//!   cause is other parameters, not an effect.
+//!   noise is left. If these parameters, with wider tolerances, explain as much without any effect,
+//!   the rig has other parameter values, not an additional effect.
 //!
 //! *Implausible noise*: a simulator without effects leaves less than [`LEAST_NOISE`] of the noise.
-//! Noise cannot do that, so it was estimated or stated too large, and a gap of that size would be
-//! invisible.
+//! Real noise cannot be simulated, so the noise was estimated or stated too large, and a gap of
+//! that size would be invisible.
 
 use crate::{
     evidence::gathered::Evidence,
@@ -32,25 +34,27 @@ use crate::{
     search::sets::LEFT,
 };
 
-/// Factor on the tolerances of parameters at their bounds, to test whether they then explain all.
+/// Factor by which the tolerances of parameters at their bounds are widened, to test whether these
+/// parameters then explain everything.
 const LOOSE: f64 = 5.0;
-/// Share of its nominal value down to which such a parameter may go.
+/// Smallest value of a parameter with a widened tolerance, as a share of its nominal value.
 const KEPT: f64 = 0.02;
 
-/// Smallest plausible residual, as a share of the noise, both as root mean squares. A simulator
-/// without effects cannot follow noise.
+/// Smallest plausible ratio of the root mean square residual to the noise. A simulator without
+/// effects cannot follow noise.
 const LEAST_NOISE: f64 = 0.5;
 
 /// Whether the data can come from the simulator at all.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Sanity {
-    /// By stage: share of its channel's variance that the best effects leave.
+    /// By stage: share of its channel's variance that the best set of effects leaves.
     pub(crate) left: Vec<f64>,
-    /// Share that may be left before names of effects mean nothing.
+    /// Largest share that may be left. If more is left, the names of effects mean nothing.
     pub(crate) allowed: f64,
-    /// The stage with parameters at their bounds that leaves most, if any.
+    /// Of the stages with parameters at their bounds, the one with the largest remaining excess, if
+    /// any.
     pub(crate) at_bounds: Option<AtBounds>,
-    /// Stages whose noise is implausible, with the share of it that is left.
+    /// Stages whose noise level is implausible, each with the ratio of its residual to the noise.
     pub(crate) implausible: Vec<(usize, f64)>,
 }
 
@@ -62,9 +66,9 @@ pub(crate) struct AtBounds {
     pub(crate) ended: Vec<usize>,
     /// Excess that is left on the test trials.
     pub(crate) left: f64,
-    /// Excess over the fitted trials with the best effects, and without effects but with wider
-    /// tolerances of these parameters. `None` if there is no effect to compare with, or if the
-    /// latter cannot be simulated.
+    /// Two excesses over the fitted trials: with the best set of effects, and without effects but
+    /// with wider tolerances of these parameters. `None` if there is no effect to compare with, or
+    /// if the second case cannot be simulated.
     pub(crate) rivals: Option<(f64, f64)>,
 }
 
@@ -93,8 +97,8 @@ fn left(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64
     let sd = &problem.compare.metrics[stage].noise.sd;
     let (mut count, mut sum, mut squares, mut left) = (0.0, 0.0, 0.0, 0.0);
     for segment in evidence.roles.of_role(Role::Test) {
-        // Samples that were not measured, and isolated outliers, do not count, whatever their
-        // value.
+        // Samples that were not measured and isolated outliers have infinite noise. They do not
+        // count.
         for i in (segment.from..segment.to).filter(|i| sd[*i].is_finite()) {
             count += 1.0;
             sum += measured[i];
@@ -103,13 +107,13 @@ fn left(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64
         }
     }
     let variance = squares - sum * sum / f64::max(count, 1.0);
-    // Noise is no misfit.
+    // The contribution of the noise is not a misfit.
     let noise = count * traces.noise * traces.noise;
     (left - noise) / variance.max(noise).max(f64::MIN_POSITIVE)
 }
 
-/// Returns the root mean square of a stage's residual in multiples of the noise, as shipped or
-/// re-tuned, whichever is less.
+/// Returns the root mean square of a stage's residual in multiples of the noise: the smaller of the
+/// values as shipped and re-tuned.
 fn of_noise(problem: &PreparedProblem<'_>, evidence: &Evidence, stage: usize) -> f64 {
     let (traces, measured) = (&evidence.stages[stage], problem.simulator().measured(stage));
     let sd = &problem.compare.metrics[stage].noise.sd;

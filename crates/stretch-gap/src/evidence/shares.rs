@@ -1,12 +1,14 @@
-//! Share of each effect of the best set, so that an answer without a name still reports what is
-//! known.
+//! Computes the share of the gap that each effect of the best set closes, so that the report
+//! contains these shares even if no effect is named.
 //!
-//! Effects overlap: the shares that each closes alone add up to more than the whole. Therefore
-//! effects are removed from the weakest to the strongest, with the rest fitted again each time. The
-//! shares (gap without - gap with)/gap of the nominal simulator then add up to what the set closes.
-//! Shares are of the gap in the test trials, because a fit can close anything in the fitted ones.
-//! The size of an effect is, like that of every gap, the larger of fitted and test trials, because
-//! an effect that acts only in long trials (a creep of half a minute) closes little in short ones.
+//! Effects overlap: the shares that each closes alone may add up to more than the whole. Therefore
+//! effects are removed one after the other, from the weakest to the strongest, and the remaining
+//! ones are fitted again each time. The share of an effect is (gap without it - gap with it)/gap of
+//! the nominal simulator. These shares add up to the share that the whole set closes. They are
+//! computed on the test trials, because on fitted trials any effect closes something. The excess
+//! that an effect closes (its size) is, like every gap, the larger of the values on fitted and on
+//! test trials. The reason is that an effect that acts only in long trials (creep over half a
+//! minute) closes little in short ones.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -39,8 +41,8 @@ pub struct EffectShare {
     pub at_bound: bool,
 }
 
-/// Removes the effects of the best set one after the other, the weakest first: returns the effect,
-/// and what is left without it.
+/// Removes the effects of the best set one after the other, the weakest first. Returns each removed
+/// effect with the fitted set that remains.
 pub(crate) fn eliminated(
     sets: &mut Sets<'_>,
     best: &Hypothesis,
@@ -70,7 +72,7 @@ pub(crate) fn shares(
     eliminated: &[(usize, Hypothesis)],
 ) -> Result<Vec<EffectShare>, GapError> {
     // The noise is known to a few per cent. If the best set leaves less than the estimated noise,
-    // measure excesses from what it leaves.
+    // excesses are relative to what it leaves.
     let least: Vec<f64> = evidence.stages.iter().map(|s| s.excess_after.min(0.0)).collect();
     let above =
         |stage: usize, blocks: &[f64]| (excess(mean_square(blocks)) - least[stage]).max(0.0);
@@ -82,7 +84,7 @@ pub(crate) fn shares(
     for (effect, less) in eliminated {
         let stages = 0..nominal.len();
         let without: Vec<f64> = match less.effects.is_empty() {
-            // The nominal was run already.
+            // The nominal simulator was run already.
             true => nominal.clone(),
             false => {
                 let left = |s| Ok(above(s, &evidence.blocks(problem, s, &less.model)?.test));

@@ -1,12 +1,14 @@
-//! Stability of a name: the share of other records like this one in which it would be named.
+//! Computes the stability of each effect: the share of other recordings like this one in which the
+//! most probable set of effects would contain it.
 //!
-//! Blocks of each role are drawn with replacement as for the [interval of what
-//! closes](crate::evidence::bootstrap), the same blocks for every set and channel. What the sets
-//! leave of a drawn record is a sum over its blocks, so scores, gaps and probabilities follow
-//! without a simulation or a fit. The share of draws in which the most probable set holds an effect
-//! is its stability (Meinshausen and Buehlmann 2010, doi 10.1111/j.1467-9868.2010.00740.x). Sets
-//! whose probabilities differ by less than a hundredth share a draw, so each of two twins has a
-//! half.
+//! Blocks of fitted, held-out and test samples are drawn with replacement, as for the
+//! [interval of the closed-gap fraction](crate::evidence::bootstrap). The same blocks are drawn for
+//! every set and channel. The misfit of a set in a drawn recording is a sum over its blocks, so
+//! scores, gaps and probabilities follow without a simulation or a fit. The share of draws in which
+//! the most probable set holds an effect is its stability (Meinshausen and Buehlmann 2010, doi
+//! 10.1111/j.1467-9868.2010.00740.x). If the probabilities of several sets differ by less than 1 %,
+//! these sets share the draw equally. Therefore each of two effects that cannot be distinguished
+//! has a stability of at most one half.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -24,7 +26,7 @@ use crate::{
     problem::thresholds::Thresholds,
 };
 
-/// Records that are drawn.
+/// Number of recordings that are drawn.
 const DRAWS: usize = 200;
 
 /// How stable an effect is in the most probable set of effects.
@@ -44,7 +46,7 @@ pub struct EffectStability {
     pub stability: f64,
 }
 
-/// How often each block of a role is drawn.
+/// How often each block of fitted, held-out and test samples is drawn.
 struct Drawn {
     fit: Vec<f64>,
     held: Vec<f64>,
@@ -62,7 +64,7 @@ impl Drawn {
     }
 }
 
-/// What a set leaves of a drawn record: its misfits, and the gap of the test trials.
+/// What a set leaves in a drawn recording: its misfits, and the gap on the test trials.
 struct Left {
     misfits: Vec<Misfit>,
     tested: f64,
@@ -70,8 +72,9 @@ struct Left {
 
 impl Left {
     fn of(misfits: &[Misfit], blocks: &[Blocks], drawn: &Drawn) -> Self {
-        // A misfit also includes stretches shorter than a block, and is at equal transmitted noise.
-        // Therefore it changes by as much as the mean over its blocks does.
+        // A misfit is not just the mean over its blocks: it includes stretches that are shorter
+        // than a block, and is corrected to equal transmitted noise. Therefore it is shifted by as
+        // much as the mean over the blocks changes.
         let moved = |whole: f64, blocks: &[f64], times: &[f64]| match blocks.is_empty() {
             true => whole,
             false => {
@@ -91,14 +94,14 @@ impl Left {
         }
     }
 
-    /// The larger gap of fitted and test trials, as everywhere.
+    /// Returns the gap: the larger of the gaps on fitted and on test trials.
     fn gap(&self, problem: &PreparedProblem<'_>, evidence: &Evidence) -> f64 {
         evidence.gap_of(problem, &self.misfits).max(self.tested)
     }
 }
 
-/// The stability of every effect of the weighed sets, the most stable first; `blocks` holds what
-/// each set leaves, in their order.
+/// Returns the stability of every effect of the sets in the posterior, the most stable first.
+/// `blocks` holds the reduced chi-squares of each set, in the order of the sets.
 pub(crate) fn stabilities(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,

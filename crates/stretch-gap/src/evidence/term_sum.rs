@@ -1,16 +1,19 @@
-//! A hypothesis for what the catalogue lacks: a function of what was recorded, in place of all
-//! effects.
+//! Scores a hypothesis for what the catalogue lacks: a function of the recorded signals, in place
+//! of all effects.
 //!
-//! A sum of k terms with j shapes, chosen among M and fitted together with the nominal parameters,
-//! is scored as every set of effects, and is penalised for the choice:
+//! The function is a sum of k terms, chosen from M terms of a library and fitted together with the
+//! nominal parameters. The terms have j shape parameters in total (for example the width of a
+//! knee). The sum is scored like a set of effects, and in addition penalised for the choice of its
+//! terms:
 //!
 //! ```text
 //! S_f = sum over stages of (N/2m) ln(X_nominal/X) - ((k + j)/2) ln(blocks) - k ln M - d
 //! ```
 //!
-//! where d is what [deviations](crate::fit::deviations) of the forms of its effects add to the best
-//! set. A sum of any terms has to explain more than another form of the effects would. If it does,
-//! the cause is outside the catalogue.
+//! Here N, m, X and blocks are those of [`score`](crate::fit::score). d is the rise of the best
+//! set's score by [deviations](crate::fit::deviations) of the forms of its effects: a sum of terms
+//! has to explain more than other forms of these effects would. If it does, the cause is outside
+//! the catalogue.
 
 use crate::{
     evidence::{gathered::Evidence, probability::Function},
@@ -19,8 +22,9 @@ use crate::{
     problem::{error::GapError, sample_roles::Role, thresholds::Thresholds},
 };
 
-/// The score of a proposed sum of terms in place of all effects, to be compared with the best set
-/// of effects; `None` if no sum of terms was found that predicts anything.
+/// Returns score and remaining excess of a proposed sum of terms in place of all effects, to be
+/// compared with the best set of effects. `None` if no sum of terms was found that predicts
+/// anything.
 pub(crate) fn weigh_term_sum(
     problem: &PreparedProblem<'_>,
     evidence: &Evidence,

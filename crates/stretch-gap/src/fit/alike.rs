@@ -1,31 +1,34 @@
-//! Accounts for errors that outputs share, so that none of them counts as an explanation of the
-//! others.
+//! Accounts for errors that several outputs have in common, so that one output's error does not
+//! count as an explanation of another's.
 //!
 //! An effect that reads another measured output (crosstalk) also reads the errors of that output.
-//! Outputs of one record are seldom independent, because what the simulator lacks shows in all that
-//! see the same motion. Such an effect removes from one output what it has in common with the
-//! other, whatever the cause. In a circle of outputs each explains the next, and nothing is
-//! explained. The correlation of the errors explains as much: as a vector they have a covariance C
-//! (seemingly unrelated regressions: Zellner 1962, doi 10.1080/01621459.1962.10480664), with
-//! correlations R,
+//! Outputs of one recording are seldom independent, because a missing effect shows in all outputs
+//! that depend on the same motion. Crosstalk then removes from one output the error that it has in
+//! common with another, whatever the cause of this error is. If every output reads another, all
+//! errors are removed, but nothing is explained. The correlation of the errors describes the data
+//! equally well: at each sample, the errors of all outputs form a vector with a covariance C and
+//! correlations R (seemingly unrelated regressions: Zellner 1962, doi
+//! 10.1080/01621459.1962.10480664). With the reduced chi-square X of each stage and n observations,
 //!
 //! ```text
 //! ln det C = sum over stages of ln X + ln det R,     A = (n/2) (ln det R_unread - ln det R)
 //! ```
 //!
 //! Subtracting c times one output's error from another's does not change det C, because the change
-//! of coordinates is triangular. Therefore a set with such effects is scored with A, where R_unread
-//! are the correlations of the residuals without any reading. What these effects explain only by
-//! errors does not count, what they explain beyond counts in full, and the score of a set without
-//! them does not change. Without reading, the parameters compensate as far as they can. Let d be
-//! the contribution of the effects. In the next equation, A is not the score above but the matrix
-//! of the sensitivities to the parameters:
+//! of coordinates is triangular. Therefore the correction A is added to the score of a set with
+//! effects that read other outputs. R_unread are the correlations of the residuals without the
+//! contribution of these effects. With the correction, explaining one error by another does not
+//! count, all other explanations count in full, and the score of a set without such effects does
+//! not change. If the contribution d of the effects is left out, the parameters compensate for it
+//! as far as they can, so the residual is the following. Here A is not the correction above but the
+//! matrix of the sensitivities to the parameters:
 //!
 //! ```text
 //! r_unread = r + d - A (A'V^-1 A + b I)^-1 A'V^-1 d
 //! ```
 //!
-//! n is the mean of N/m over the outputs that read.
+//! n is the mean, over the outputs that read others, of the effective sample sizes N/m of
+//! [`score`](crate::fit::score).
 
 use std::sync::Arc;
 
@@ -33,24 +36,24 @@ use nalgebra::DMatrix;
 
 use crate::numerics::linear::Cholesky;
 
-/// Residual of an output without its nuisances, over fitted and over held-out samples.
+/// Residual of an output without its nuisances, over the fitted and over the held-out samples.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Errors {
     pub(crate) fit: Vec<f32>,
     pub(crate) held: Vec<f32>,
 }
 
-/// Errors of an output that another one reads, or that reads another one.
+/// Errors of an output that reads another one or is read by another one.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Read {
-    /// With the model.
+    /// Errors that the model leaves.
     pub(crate) left: Arc<Errors>,
-    /// With the model, but without the effects that read.
+    /// Errors that the model leaves without its effects that read other outputs.
     pub(crate) unread: Arc<Errors>,
 }
 
-/// Returns A of the module's head, nats. `read` holds, for every output, its errors and the
-/// effective numbers of its fitted and held-out samples.
+/// Returns the correction A of the module documentation, nats. `read` holds, for every output, its
+/// errors and the effective sample sizes of its fitted and held-out samples.
 pub(crate) fn taken(read: &[(&Read, [f64; 2])]) -> f64 {
     let readers = || read.iter().filter(|(read, _)| !Arc::ptr_eq(&read.left, &read.unread));
     if readers().next().is_none() {
@@ -65,7 +68,7 @@ pub(crate) fn taken(read: &[(&Read, [f64; 2])]) -> f64 {
     of_role(0, |e| &e.fit) + of_role(1, |e| &e.held)
 }
 
-/// ln det R of the module's head.
+/// Returns ln det R of the module documentation.
 fn ln_determinant(errors: &[&[f32]]) -> f64 {
     let sizes: Vec<f64> = errors.iter().map(|e| product(e, e).sqrt()).collect();
     let correlation = |i: usize, j: usize| match i == j {
@@ -90,8 +93,9 @@ mod tests {
     const SAMPLES: usize = 4000;
     const OBSERVATIONS: [f64; 2] = [75.0, 25.0];
 
-    /// Score of the residual with effects that read other outputs, against the residual without
-    /// them; both relative to what the nominal simulator leaves.
+    /// Returns the score of residuals with effects that read other outputs, including the
+    /// correction. `nominal` are the residuals of the nominal simulator, `unread` those without
+    /// these effects.
     fn nats(nominal: &[Vec<f64>], left: &[Vec<f64>], unread: &[Vec<f64>]) -> f64 {
         let errors = |own: &[f64]| {
             let values: Vec<f32> = own.iter().map(|x| *x as f32).collect();
@@ -109,8 +113,8 @@ mod tests {
         0.5 * OBSERVATIONS.iter().sum::<f64>() * alone + taken(&read)
     }
 
-    /// Three outputs whose residuals share one cause of the given `size`, each with an independent
-    /// error.
+    /// Returns a common cause, and three outputs whose residuals contain it with the given `size`
+    /// in addition to an independent error each.
     fn outputs(size: f64) -> (Vec<f64>, Vec<Vec<f64>>) {
         let mut random = RandomGenerator::new(5, 0);
         let cause: Vec<f64> = (0..SAMPLES).map(|_| random.gauss()).collect();
@@ -123,8 +127,9 @@ mod tests {
         of.iter().zip(other).map(|(x, other)| x - share * other).collect()
     }
 
-    /// One output explains of another only the error that they share, which would score 80 nats
-    /// alone. The cause of that error keeps its score.
+    /// Crosstalk that only explains one output's error by another's would score 80 nats without the
+    /// correction and must score nothing with it. The true cause of the common error keeps its
+    /// score.
     #[test]
     fn a_shared_error_is_no_explanation_and_its_cause_is() {
         let (cause, nominal) = outputs(3.0);
@@ -141,7 +146,8 @@ mod tests {
         );
     }
 
-    /// What an effect reads of another output's true course, without its error, counts in full.
+    /// If an effect reads the true course of another output, without its error, its explanation
+    /// counts in full.
     #[test]
     fn what_is_read_of_errors_of_their_own_counts() {
         let (cause, errors) = outputs(0.0);
@@ -151,7 +157,7 @@ mod tests {
         approx::assert_relative_eq!(nats(&nominal, &errors, &nominal), alone, max_relative = 0.05);
     }
 
-    /// Copies of one output stay finite.
+    /// The result stays finite if outputs are copies of each other.
     #[test]
     fn a_copy_is_finite() {
         let (_, mut nominal) = outputs(1.0);

@@ -1,5 +1,5 @@
-//! A simulator and its measurements, every stage driven by its measured input and judged in its own
-//! metric.
+//! Compares a simulator with its measurements. Every stage is driven by its measured input, and its
+//! residual is measured in its own metric.
 
 use std::sync::Arc;
 
@@ -34,16 +34,17 @@ const DRAWS: u64 = 4;
 pub(crate) struct Comparison<'a> {
     pub(crate) runs: Runs<'a>,
     pub(crate) roles: SampleRoles,
-    /// One per stage.
+    /// The metric of each stage.
     pub(crate) metrics: Vec<Metric>,
 }
 
-/// Sensitivities of the nominal parameters of one stage, by parameter.
+/// Sensitivities of one stage's output to its nominal parameters, each with the index of the
+/// parameter.
 pub(crate) type Sensitivities = Vec<(usize, Column)>;
 
 impl<'a> Comparison<'a> {
-    /// Computes noise and metrics around a model. The nuisances are as large as those of `like`, if
-    /// given.
+    /// Computes noise and metrics around a model. If `like` is given, the nuisances have the sizes
+    /// and correlation times of those metrics.
     pub(crate) fn around(
         runs: Runs<'a>,
         roles: SampleRoles,
@@ -80,7 +81,7 @@ impl<'a> Comparison<'a> {
         Ok(gained)
     }
 
-    /// The same session with another simulator, in separate metrics.
+    /// The same session with another simulator, and its own copy of the metrics.
     pub(crate) fn beside<'b>(
         &self,
         simulator: &'b dyn Simulator,
@@ -96,13 +97,14 @@ impl<'a> Comparison<'a> {
         self.runs.simulator()
     }
 
-    /// Returns the weight of a sample in the cost of a fit. A block counts as one observation,
-    /// however long the residual is correlated.
+    /// Returns the weight of a sample in the cost of a fit. A block of samples counts as one
+    /// observation, whatever the correlation time of the residual is.
     pub(crate) fn weight(&self) -> f64 {
         1.0 / self.roles.block as f64
     }
 
-    /// Measured minus simulated, in multiples of the noise, over the trials that fits run.
+    /// Returns measured minus simulated output, in multiples of the noise, over the trials that
+    /// fits use.
     pub(crate) fn residual_values(
         &self,
         stage: usize,
@@ -118,7 +120,7 @@ impl<'a> Comparison<'a> {
         Run { near, ..Run::exact(stage, model, self.roles.fit_trials) }
     }
 
-    /// Measured minus simulated, in multiples of the noise.
+    /// Returns measured minus simulated output, in multiples of the noise.
     fn apart(&self, stage: usize, mut values: Vec<f64>) -> Vec<f64> {
         let measured = self.simulator().measured(stage);
         for ((x, m), sd) in values.iter_mut().zip(measured).zip(&self.metrics[stage].noise.sd) {
@@ -127,7 +129,7 @@ impl<'a> Comparison<'a> {
         values
     }
 
-    /// [`Comparison::residual_values`] of some stages and models, in one batch.
+    /// Computes [`Comparison::residual_values`] of some pairs of a stage and a model, in one batch.
     pub(crate) fn residuals_of(
         &self,
         wanted: &[(usize, &Model)],
@@ -139,8 +141,8 @@ impl<'a> Comparison<'a> {
         outputs.map(|(output, (stage, _))| Ok(self.apart(*stage, output?))).collect()
     }
 
-    /// [`Comparison::residual_values`] of each of some models in each of some stages, in one batch;
-    /// `None` for a model that cannot be simulated.
+    /// Computes [`Comparison::residual_values`] of every model in every stage, in one batch; `None`
+    /// for a model that cannot be simulated.
     pub(crate) fn possible_residuals(
         &self,
         stages: &[usize],
@@ -161,18 +163,20 @@ impl<'a> Comparison<'a> {
         models.iter().map(one).collect()
     }
 
-    /// Measured minus simulated, in multiples of the noise, ready for products.
+    /// Returns measured minus simulated output, in multiples of the noise, prepared for products in
+    /// the metric.
     pub(crate) fn residual(&self, stage: usize, model: &Model) -> Result<Column, GapError> {
         let values = self.residual_values(stage, model)?;
         Ok(self.metrics[stage].column(&self.roles, values))
     }
 
-    /// x'V^-1 y of a stage over the fitted samples.
+    /// Returns x'V^-1 y of a stage over the fitted samples.
     pub(crate) fn product(&self, stage: usize, x: &Column, y: &Column) -> f64 {
         self.metrics[stage].product(&self.roles, x, y, Role::Fit)
     }
 
-    /// Reduced chi-squares of a residual, at the noise that its own model transmits.
+    /// Returns the reduced chi-squares of a residual, not yet corrected to
+    /// [equal transmitted noise](Misfit::at_equal_noise).
     pub(crate) fn misfit(&self, stage: usize, residual: &Column) -> Misfit {
         let mean = |role| {
             let n = self.metrics[stage].measured(&self.roles, role) as f64;
@@ -206,13 +210,13 @@ impl<'a> Comparison<'a> {
         Arc::new(Errors { fit: of(Role::Fit), held: of(Role::Held) })
     }
 
-    /// Reduced chi-square over fitted and held-out samples together.
+    /// Returns the reduced chi-square over fitted and held-out samples together.
     pub(crate) fn mean_square(&self, misfit: &Misfit) -> f64 {
         let (fit, held) = (self.roles.blocks(Role::Fit), self.roles.blocks(Role::Held));
         (fit * misfit.fit + held * misfit.held) / (fit + held)
     }
 
-    /// Samples of a stage that count as one observation of its misfit at a model.
+    /// Returns how many samples of a stage count as one observation of the misfit of a model.
     pub(crate) fn samples_per_observation(
         &self,
         stage: usize,
@@ -224,7 +228,8 @@ impl<'a> Comparison<'a> {
         Ok(samples_per_observation(&parts.collect::<Vec<_>>(), self.roles.block))
     }
 
-    /// Octaves of a residual in multiples of the noise over fitted and held-out samples.
+    /// Returns the mean squares by [octaves](crate::fit::octaves) of a residual in multiples of the
+    /// noise, over fitted and held-out samples.
     pub(crate) fn octaves(&self, stage: usize, residual: &[f64]) -> Octaves {
         let mut clean = residual.to_vec();
         self.metrics[stage].clean(&self.roles, &mut clean);
@@ -273,10 +278,11 @@ impl<'a> Comparison<'a> {
     }
 
     /// Computes the sensitivities -dr/dx of the stages to some coordinates, by one-sided
-    /// differences in one batch. `None` for a coordinate that does not act, or if neither side of
-    /// it can be simulated.
+    /// differences in one batch. `None` for a coordinate that does not act in the stage, or if
+    /// neither a step up nor a step down can be simulated.
     ///
-    /// The simulator may answer the moved runs from a linearisation around the parameters `near`.
+    /// The simulator may answer the runs with moved coordinates from a linearisation around the
+    /// parameters `near`.
     pub(crate) fn sensitivities(
         &self,
         stages: &[usize],
@@ -307,7 +313,7 @@ impl<'a> Comparison<'a> {
         let columns = places.par_iter().zip(there).map(|(&(c, s), there)| {
             let ((coordinate, _), (step, _)) = (&coordinates[c], &moved[c]);
             let (step, there) = match there {
-                // This side cannot be simulated: take the slope of the other side.
+                // A step to this side cannot be simulated: step to the other side.
                 Err(error) if !error.ends_all() => {
                     let mut other = model.clone();
                     coordinate.write(&mut other, coordinate.read(model) - step);
@@ -331,7 +337,8 @@ impl<'a> Comparison<'a> {
         Ok(out)
     }
 
-    /// Sensitivities of a stage to its nominal parameters at a model, one standard deviation each.
+    /// Returns the sensitivities of a stage to its nominal parameters at a model, for a change by
+    /// one tolerance each.
     pub(crate) fn nominal_sensitivities(
         &self,
         stage: usize,

@@ -1,15 +1,16 @@
-//! Coordinates of a fit: every free parameter, scaled such that 1 is a large step, with its prior
-//! and its bounds.
+//! Defines the coordinates of a fit: the free parameters, scaled such that a change by 1 is large,
+//! with their priors and bounds.
 //!
 //! | parameter | coordinate x | prior | bounds |
 //! | --- | --- | --- | --- |
-//! | nominal | (value - nominal)/tolerance | Gaussian, 0 and 1 | three tolerances |
+//! | nominal | (value - nominal)/tolerance | Gaussian, mean 0, standard deviation 1 | three tolerances |
 //! | strength | value/range | flat | its range |
-//! | shape, on a logarithmic scale | ln value | Gaussian, the middle and half of its range | its range |
-//! | form | as above | Gaussian around its usual value, 0.35 of its range | its range |
+//! | shape, on a logarithmic scale | ln value | Gaussian, mean in the middle of its range, standard deviation half of it | its range |
+//! | form | value/range or ln value | Gaussian around its usual value, standard deviation 0.35 of its range | its range |
 //!
-//! The prior's part of a cost is -ln p(x) without its constant. A flat prior on a strength makes
-//! the absence of the effect no special case; the penalty for the choice is part of the score.
+//! A prior p adds -ln p(x), without its constant, to the cost of a fit. The prior of a strength is
+//! flat, so that strength 0 (no effect) is not preferred; the penalty for having the effect is part
+//! of the score.
 
 use stretch_effects::EffectParameter;
 
@@ -17,7 +18,7 @@ use crate::problem::simulator::{Model, Simulator};
 
 /// Standard deviation of a form around its usual value, as a share of its range.
 const FORM_SD: f64 = 0.35;
-/// Tolerances within which a re-tuned parameter stays.
+/// Largest distance of a re-tuned parameter from its nominal value, in tolerances.
 pub(crate) const REACH: f64 = 3.0;
 
 /// One coordinate of a fit.
@@ -31,7 +32,7 @@ pub(crate) enum Coordinate {
     Log { slot: usize, index: usize, middle: f64, half: f64, is_form: bool },
 }
 
-/// -ln of the prior, its slope and its curvature.
+/// -ln of a prior without its constant (the cost), with its slope and its curvature.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Prior {
     pub(crate) cost: f64,
@@ -58,7 +59,7 @@ impl Coordinate {
         *place = self.value(x);
     }
 
-    /// The value at x.
+    /// Returns the parameter's value at the coordinate x.
     pub(crate) fn value(self, x: f64) -> f64 {
         match self {
             Self::Nominal { nominal, sd, .. } => nominal + sd * x,
@@ -67,7 +68,7 @@ impl Coordinate {
         }
     }
 
-    /// Change of the value for a change of x by 1, around a value.
+    /// Returns the change of the parameter's value if x changes by 1, at a given value.
     pub(crate) fn slope(self, value: f64) -> f64 {
         match self {
             Self::Nominal { sd, .. } => sd,
@@ -92,8 +93,8 @@ impl Coordinate {
         Prior { cost, slope, curvature }
     }
 
-    /// Step of a one-sided difference: small against the curvature, large against a simulation's
-    /// rounding.
+    /// Returns the step of a one-sided difference: small enough that curvature does not matter,
+    /// large compared with the rounding of a simulation.
     pub(crate) fn probe(self, x: f64) -> f64 {
         match self {
             Self::Nominal { .. } | Self::Log { .. } => 0.03,
@@ -101,8 +102,8 @@ impl Coordinate {
         }
     }
 
-    /// Longest single step, because beyond it the linearisation is poor. A logarithm changes by at
-    /// most a factor of three.
+    /// Returns the longest step of one iteration; beyond it, the linearisation is poor. A parameter
+    /// on a logarithmic scale changes by at most a factor of three.
     pub(crate) fn stride(self) -> f64 {
         match self {
             Self::Nominal { .. } => 6.0,
@@ -111,7 +112,7 @@ impl Coordinate {
         }
     }
 
-    /// Whether the output of a stage may depend on it.
+    /// Whether the output of a stage may depend on the coordinate.
     pub(crate) fn acts_in(self, simulator: &dyn Simulator, stage: usize, model: &Model) -> bool {
         match self {
             Self::Nominal { index, .. } => simulator.stages()[stage].parameters.contains(&index),
@@ -130,7 +131,8 @@ impl Coordinate {
     }
 }
 
-/// Free parameters of some stages and of a model's effects, each with its bounds.
+/// Returns the coordinates of the nominal parameters of some stages and of the model's effects,
+/// each with its bounds.
 pub(crate) fn coordinates(
     simulator: &dyn Simulator,
     stages: &[usize],
@@ -162,7 +164,8 @@ fn of_effects(
     model.effects.iter().enumerate().flat_map(|(slot, (effect, values))| {
         let specs = &simulator.effects()[*effect].parameters;
         let free = specs.iter().enumerate().filter(|&(index, p)| {
-            // A second threshold that is off stays off, because it is another form of the effect.
+            // A second threshold that is off stays off, because switching it on would make another
+            // form of the effect.
             let is_other = index > 0 || values.len() > 1;
             let is_off = p.off() == Some(values[index]) && values[index] != 0.0;
             p.is_fitted() && !(is_other && is_off)
@@ -188,14 +191,16 @@ fn of_parameter(slot: usize, index: usize, p: &EffectParameter) -> (Coordinate, 
     }
 }
 
-/// -ln prior of the forms of a model's effects: the cost of values away from the usual ones.
+/// Returns -ln of the prior of the forms of a model's effects: the cost of forms that differ from
+/// the usual ones.
 pub(crate) fn form_cost(simulator: &dyn Simulator, model: &Model) -> f64 {
     let all = of_effects(simulator, model).map(|(coordinate, _)| coordinate);
     all.filter(|c| c.is_form()).map(|c| c.prior(c.read(model)).cost).sum()
 }
 
-/// -ln prior of the way in which an effect acts (a saturation at either end): each of n ways has
-/// the probability 1/n, so choosing one costs ln n.
+/// Returns -ln of the prior of the ways in which effects act. For example, a saturation may be at
+/// the lower or at the upper end. Each of n ways has the probability 1/n, so choosing one costs ln
+/// n.
 pub(crate) fn choice_cost(simulator: &dyn Simulator, model: &Model) -> f64 {
     let one = |(effect, values): &(usize, Vec<f64>)| {
         let specs = &simulator.effects()[*effect].parameters;
@@ -206,8 +211,8 @@ pub(crate) fn choice_cost(simulator: &dyn Simulator, model: &Model) -> f64 {
     model.effects.iter().map(one).sum()
 }
 
-/// Free parameters that the score counts: parameters of effects, except forms and parameters that
-/// are off.
+/// Returns the number of free parameters that the score penalises: parameters of effects, except
+/// forms and parameters that are off.
 pub(crate) fn free_parameters(simulator: &dyn Simulator, model: &Model) -> usize {
     let one = |(effect, values): &(usize, Vec<f64>)| {
         let specs = simulator.effects()[*effect].parameters.iter().zip(values);

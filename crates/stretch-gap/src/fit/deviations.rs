@@ -1,32 +1,38 @@
-//! Deviations of form: what a hypothesis explains without a further effect, because no effect of a
-//! catalogue has exactly the form of a real one.
+//! Computes deviations of form. No effect of a catalogue has exactly the form of the real effect,
+//! so a hypothesis may explain part of its residual by deviations of its effects' forms, without a
+//! further effect.
 //!
 //! Let d be the contribution of an effect to an output, in multiples of the noise: the residual
-//! without the effect minus the residual with it. A real effect of the same kind has further poles,
-//! and a curve that bends otherwise. To first order it contributes
+//! without the effect minus the residual with it. A real effect of the same kind may have further
+//! poles and a differently bent curve. To first order it contributes
 //!
 //! ```text
 //! d + sum_j c_j b_j,     b = d - L d with lags L of 3, 30 and 300 samples;  z d and (z^2 - 1/3) d,     c_j ~ N(0, s^2)
 //! ```
 //!
-//! with z the output, scaled to -1 to 1 over its span, and s the *model discrepancy*: the share of
-//! an effect's contribution that another form of it changes (embedded model error: Sargsyan, Najm
-//! and Ghanem 2015, doi 10.1002/kin.20906). The columns b_j form B. A are the sensitivities of the
-//! nominal parameters and of the effects' strengths; a deviation must not take their part (Plumlee
-//! 2017, doi 10.1080/01621459.2016.1211016). The coefficients x = (a, c) are those of
+//! Three of the b_j are the differences between d and its output L d from a first-order lag with a
+//! time constant of 3, 30 or 300 samples. Two are d multiplied by functions of the simulated output
+//! z, which is scaled to the range -1 to 1. s is the *model discrepancy*: the share of an effect's
+//! contribution by which another form of the effect may differ (embedded model error: Sargsyan,
+//! Najm and Ghanem 2015, doi 10.1002/kin.20906). The b_j are the columns of B. The columns of A are
+//! the sensitivities to the nominal parameters and to the effects' strengths. They are fitted
+//! together with the deviations, so that a deviation does not explain what a parameter can explain
+//! (Plumlee 2017, doi 10.1080/01621459.2016.1211016). The coefficients x = (a, c) of A and B solve
 //!
 //! ```text
 //! N x = [A B]'V^-1 r/b,     N = [A B]'V^-1 [A B]/b + diag(1, 1/s^2)
 //! ```
 //!
-//! The deviations lower the reduced chi-square of fitted and of held-out samples, although they are
-//! fitted only to the former. By Laplace's approximation they cost
+//! with the residual r and b samples in a block. The deviations are fitted to the fitted samples,
+//! and lower the reduced chi-square of fitted and of held-out samples. By Laplace's approximation,
+//! n deviations cost
 //!
 //! ```text
 //! sum x_i^2 prior_i/2 + (ln det N - ln det N_A + 2 n ln s)/2
 //! ```
 //!
-//! The only simulations needed are those without each effect.
+//! N_A is the part of N that belongs to A. The only new simulations are one per effect, with this
+//! effect left out.
 
 use nalgebra::DMatrix;
 
@@ -45,15 +51,15 @@ use crate::{
 /// Time constants of further poles, samples.
 const LAGS: [f64; 3] = [3.0, 30.0, 300.0];
 
-/// Standard deviations within which a coefficient stays: an effect that would have to change
-/// several times over is another effect.
+/// Largest coefficient, in standard deviations: an effect whose form would have to change by more
+/// is another effect.
 const MOST: f64 = 2.0;
 
 impl PreparedProblem<'_> {
-    /// A hypothesis with the additional explanation by deviations of its effects' forms; unchanged
-    /// if they explain nothing.
+    /// Returns a hypothesis whose misfits and score include the deviations of its effects' forms;
+    /// unchanged if the deviations explain nothing.
     ///
-    /// `share` is s of the module's head.
+    /// `share` is s of the module documentation.
     pub(crate) fn with_deviations(
         &self,
         set: &Hypothesis,
@@ -112,7 +118,7 @@ impl PreparedProblem<'_> {
         Ok(Some(Deviating { misfit, price }))
     }
 
-    /// z of the module's head: the simulated output, from -1 to 1 over its span.
+    /// Returns z of the module documentation: the simulated output, scaled to the range -1 to 1.
     fn level(&self, stage: usize, residual: &[f64]) -> Vec<f64> {
         let sds = &self.compare.metrics[stage].noise.sd;
         let measured = self.simulator().measured(stage).iter();
@@ -124,7 +130,7 @@ impl PreparedProblem<'_> {
         output.iter().map(|y| (y - low) / half - 1.0).collect()
     }
 
-    /// b_j of the module's head.
+    /// Returns the columns b_j of the module documentation.
     fn shapes(&self, doing: &[f64], level: &[f64]) -> Vec<Vec<f64>> {
         let lagged = LAGS.map(|samples| self.above_lag(doing, samples));
         let bent = |of: fn(f64) -> f64| doing.iter().zip(level).map(|(d, z)| d * of(*z)).collect();
@@ -132,8 +138,8 @@ impl PreparedProblem<'_> {
         lagged.into_iter().chain(curves).collect()
     }
 
-    /// Returns d - L d of the module's head. In every trial, the lag begins settled at the first
-    /// value.
+    /// Returns d - L d of the module documentation. In every trial, the state of the lag begins at
+    /// the first value of d.
     fn above_lag(&self, doing: &[f64], samples: f64) -> Vec<f64> {
         let kept = (-1.0 / samples).exp();
         let mut out = Vec::with_capacity(doing.len());
@@ -150,8 +156,8 @@ impl PreparedProblem<'_> {
         out
     }
 
-    /// The residual at the most likely coefficients, of which the first `begun` belong to A, and
-    /// their cost, nats.
+    /// Returns the residual that remains with the most likely coefficients, and their cost, nats.
+    /// The first `begun` columns belong to A.
     fn explained(
         &self,
         stage: usize,
@@ -188,9 +194,9 @@ impl PreparedProblem<'_> {
     }
 }
 
-/// A stage with its deviations.
+/// The result for one stage with deviations.
 struct Deviating {
     misfit: Misfit,
-    /// Nats.
+    /// Cost of the deviations, nats.
     price: f64,
 }

@@ -1,18 +1,20 @@
 //! Estimates the sizes and correlation times of a stage's nuisances (slow drift and offsets of
 //! parameters, drift of the recorder) from the recording.
 //!
-//! A supply may drift by 0.1 % or by 0.5 %, within half a second or thirty. A wrong assumption
-//! would be mistaken for an effect. Therefore the size a and correlation time tau of every drift,
-//! and the size of every offset, maximise
+//! For example, a supply may drift by 0.1 % or by 0.5 %, and within half a second or within thirty
+//! seconds. A wrong assumption would be mistaken for an effect. Therefore the size a and
+//! correlation time tau of every drift, and the size of every offset, maximise
 //!
 //! ```text
 //! L = -(r'V^-1 r + ln det V)/2 + ln p(a, tau),     V = s I + C P^-1 C'
 //! ```
 //!
-//! over the samples that are not test samples (Rasmussen and Williams 2006, section 5.4.1). The
-//! priors p are lognormal around the simulator's description, and wide enough for any lab. s keeps
-//! other parts of the residual r from being taken for a nuisance: see `Metric::spectral_level`. A
-//! recorder need not drift: a = 0 is one of its sizes.
+//! over the samples that are not test samples (Rasmussen and Williams 2006, section 5.4.1). V is
+//! the covariance of the residual r, with the columns C and prior precisions P of
+//! [`nuisance`](crate::fit::nuisance). The priors p are lognormal around the values in the
+//! simulator's description, and wide. The factor s enlarges the noise, so that other parts of the
+//! residual are not taken for a nuisance: see `Metric::spectral_level`. A recorder need not drift,
+//! so a = 0 is also tried for its drift.
 
 use rayon::prelude::*;
 
@@ -23,9 +25,10 @@ use crate::{
 
 /// Sizes that are tried, as multiples of what the simulator describes.
 const SIZES: [f64; 6] = [0.2, 0.4, 0.7, 1.0, 1.6, 2.5];
-/// Sizes that no recorder's drift has, because it is smaller than the recorder's noise. If one of
-/// them fits best, the recorder is not the cause. No drift is then assumed, so that the gap
-/// remains; a prior would only lower the likelihood of such a drift.
+/// Sizes that are too large for a recorder's drift, because such a drift is smaller than the
+/// recorder's noise. If one of these sizes fits best, the recorder is not the cause. No drift is
+/// then assumed, so that the gap remains. A prior would not suffice, because it would only lower
+/// the likelihood of a large drift.
 const BEYOND: [f64; 5] = [3.2, 4.0, 6.4, 10.0, 16.0];
 /// Correlation times that are tried, s.
 const TIMES_S: [f64; 7] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0];
@@ -33,9 +36,9 @@ const TIMES_S: [f64; 7] = [0.3, 0.7, 1.5, 3.0, 6.0, 12.0, 30.0];
 const SPREAD: (f64, f64) = (0.7, 1.1);
 
 impl Metric {
-    /// Returns the metric with the most likely nuisances for a residual in multiples of the noise,
-    /// and the rise of the log-likelihood compared with this metric, nats. The recorder is assumed
-    /// not to drift if the residual depends on the motion.
+    /// Returns the metric whose nuisances have the most likely sizes and correlation times for a
+    /// residual in multiples of the noise, and the rise of the log-likelihood compared with this
+    /// metric, nats. If the residual depends on the motion, the recorder is assumed not to drift.
     pub(crate) fn adapted(
         &self,
         roles: &SampleRoles,
@@ -49,7 +52,8 @@ impl Metric {
             let levels = levels.chain([own]);
             let one = |level| best.with(|i, own| if i == which { level } else { own }, roles);
             let levels: Vec<Level> = levels.collect();
-            // A metric is large, so build each one twice instead of keeping those of all levels.
+            // A metric needs much memory. Therefore each one is built twice instead of keeping the
+            // metrics of all levels.
             let noise = levels.par_iter().map(|level| one(*level).spectral_level(roles, residual));
             let noise = noise.reduce(|| f64::INFINITY, f64::min).max(1.0).sqrt();
             let fit = |m: &Self| m.beside(roles, residual, noise);
@@ -73,17 +77,18 @@ impl Metric {
         (best, gained)
     }
 
-    /// Returns the log-likelihood with noise that is `noise` times as large. To compare hypotheses,
-    /// a and tau are integrated over, because a fit at a single level is weaker evidence than a fit
-    /// at many:
+    /// Returns the log-likelihood if the noise is `noise` times as large as assumed. To compare
+    /// hypotheses, it is integrated over a and tau, because a residual that is likely only at a
+    /// single level (a pair of a and tau) is weaker evidence than one that is likely at many
+    /// levels:
     ///
     /// ```text
     /// ln E = l + sum over nuisances i of ln( sum_k p_k exp(l_k - l) / sum_k p_k )
     /// ```
     ///
-    /// where l is L of the module's head without ln p, and l_k has nuisance i at level k of the
-    /// grid and the others at their levels. This is exact for one nuisance, and treats several as
-    /// independent.
+    /// where l is L of the module documentation without ln p. For l_k, nuisance i has level k of
+    /// the grid, and the others keep their levels; p_k is the prior of this level. The equation is
+    /// exact for one nuisance, and treats several as independent.
     pub(crate) fn evidence(&self, roles: &SampleRoles, residual: &[f64], noise: f64) -> f64 {
         let own = self.likelihood_beside(roles, residual, noise);
         let one = |which: usize| {
@@ -103,14 +108,14 @@ impl Metric {
         own + (0..self.loose().len()).map(one).sum::<f64>()
     }
 
-    /// L of the module's head with noise that is `noise` times as large.
+    /// Returns L of the module documentation if the noise is `noise` times as large as assumed.
     fn beside(&self, roles: &SampleRoles, residual: &[f64], noise: f64) -> f64 {
         let price: f64 = self.loose().iter().map(|loose| cost(loose, loose.level)).sum();
         self.likelihood_beside(roles, residual, noise) - price
     }
 
-    /// Returns the log-likelihood with noise that is `noise` times as large. Instead of the noise,
-    /// the nuisances and the residual are scaled by 1/`noise`.
+    /// Returns the log-likelihood if the noise is `noise` times as large as assumed. Equivalently,
+    /// the nuisances and the residual are scaled by 1/`noise` while the noise stays the same.
     fn likelihood_beside(&self, roles: &SampleRoles, residual: &[f64], noise: f64) -> f64 {
         if noise == 1.0 {
             return self.likelihood(roles, residual);
@@ -128,9 +133,10 @@ impl Metric {
         -0.5 * (square(Role::Fit) + square(Role::Held) + ln_det)
     }
 
-    /// Returns the spectral level of a residual at the blocks' rate: the mean square of block means
-    /// times the samples of a block. s of the module's head is the smallest of these over all
-    /// levels that are tried, and at least the 1 of the noise alone.
+    /// Returns the spectral level of a residual at the rate of the blocks: the mean square of block
+    /// means times the number of samples in a block. White noise of variance 1 has the level 1. The
+    /// factor s of the module documentation is the smallest spectral level over all levels of the
+    /// nuisances that are tried, but at least 1.
     pub(crate) fn spectral_level(&self, roles: &SampleRoles, residual: &[f64]) -> f64 {
         let mut clean = residual.to_vec();
         self.clean(roles, &mut clean);
@@ -142,7 +148,7 @@ impl Metric {
     }
 }
 
-/// Levels that a nuisance may have; a recorder need not drift at all.
+/// Returns the levels that a nuisance may have. For a recorder, no drift is one of them.
 fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
     let times_s: Vec<f64> = match loose.drift {
         _ if loose.is_by_tick => Vec::new(),
@@ -152,7 +158,7 @@ fn hypotheses(loose: &Loose) -> impl Iterator<Item = Level> {
     loose.parameter.is_none().then_some(Level::NONE).into_iter().chain(levels(times_s, SIZES))
 }
 
-/// Levels that are too large for a recorder.
+/// Returns the levels that are too large for a recorder.
 fn beyond(loose: &Loose) -> impl Iterator<Item = Level> {
     loose.parameter.is_none().then(|| levels(TIMES_S.into(), BEYOND)).into_iter().flatten()
 }
@@ -161,7 +167,7 @@ fn levels<const N: usize>(times_s: Vec<f64>, sizes: [f64; N]) -> impl Iterator<I
     times_s.into_iter().flat_map(move |time_s| sizes.map(|size| Level { size, time_s }))
 }
 
-/// Returns -ln p; 0 without drift.
+/// Returns -ln p of a level; 0 for a nuisance of size 0.
 fn cost(loose: &Loose, Level { size, time_s }: Level) -> f64 {
     if size == 0.0 {
         return 0.0;
@@ -170,7 +176,7 @@ fn cost(loose: &Loose, Level { size, time_s }: Level) -> f64 {
     0.5 * (size.ln() / SPREAD.0).powi(2) + 0.5 * ((time_s / usual_s).ln() / SPREAD.1).powi(2)
 }
 
-/// ln sum exp x, of values of any size.
+/// Returns ln sum exp x without overflow.
 fn log_sum_exp(values: impl IntoIterator<Item = f64>) -> f64 {
     let values: Vec<f64> = values.into_iter().collect();
     let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -185,7 +191,8 @@ mod tests {
         problem::sample_roles::Segment,
     };
 
-    /// A residual of noise and a drift that acts with changing strength.
+    /// Returns a residual of noise and a drift, with a sensitivity to the drift that changes in
+    /// time.
     fn residual(size: f64, time_s: f64, drive: &[f64]) -> Vec<f64> {
         let mut random = RandomGenerator::new(12, (100.0 * time_s) as u64);
         let kept = (-0.01 / time_s).exp();
@@ -220,13 +227,13 @@ mod tests {
             let record = residual(size, time_s, &drive);
             let (adapted, gained) = metric.adapted(&roles, &record, |_| false);
             let Level { size: found, time_s: found_s } = adapted.loose()[0].level;
-            // At most one step of the grid away.
+            // The result may be at most one step of the grid away from the truth.
             assert!((0.55..1.8).contains(&(found / size)), "{found} for {size}");
             assert!((0.4..2.6).contains(&(found_s / time_s)), "{found_s} for {time_s}");
             assert!(gained >= 0.0);
         }
-        // The integral is below the maximum, but not below the maximum times its share of the
-        // prior.
+        // The integral is below the maximum of the integrand, but not below this maximum times its
+        // share of the prior.
         let record = residual(1.0, 3.0, &drive);
         let (best, _) = metric.adapted(&roles, &record, |_| false);
         let evidence = best.evidence(&roles, &record, 1.0);
@@ -240,7 +247,7 @@ mod tests {
         // The integral does not depend on the level at which the metric begins.
         let begun = metric.evidence(&roles, &record, 1.0);
         approx::assert_abs_diff_eq!(begun, evidence, epsilon = 1e-6);
-        // Noise alone: a small size is found, and adapting again gains nothing.
+        // If there is only noise, a small size is found, and adapting again gains nothing.
         let (quiet, _) = metric.adapted(&roles, &residual(0.0, 1.0, &drive), |_| false);
         assert!(quiet.loose()[0].level.size < 0.5);
         assert_eq!(quiet.adapted(&roles, &residual(0.0, 1.0, &drive), |_| false).1, 0.0);

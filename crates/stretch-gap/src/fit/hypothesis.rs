@@ -1,4 +1,5 @@
-//! A hypothesis: the effects that the rig has and the simulator lacks, with all fitted parameters.
+//! A hypothesis: the effects that the rig is assumed to have and the simulator lacks, with all
+//! fitted parameters.
 
 use std::collections::BTreeMap;
 
@@ -7,21 +8,22 @@ use crate::{
     problem::{simulator::Model, spec::EffectSpec},
 };
 
-/// A set of effects, fitted together with every nominal parameter; the re-tuned nominal simulator
-/// is the one without effects.
+/// A set of effects, fitted together with every nominal parameter. The hypothesis with an empty set
+/// is the re-tuned nominal simulator.
 #[derive(Debug, Clone)]
 pub(crate) struct Hypothesis {
     /// Indices of the effects, in the order in which they were added.
     pub(crate) effects: Vec<usize>,
-    /// Maximum a posteriori.
+    /// The simulator's parameters and effects at the maximum of the posterior.
     pub(crate) model: Model,
-    /// What the model leaves of each stage.
+    /// Misfit of the model in each stage.
     pub(crate) misfits: Vec<Misfit>,
     /// One standard deviation of the parameters of each effect.
     pub(crate) effect_sd: BTreeMap<usize, Vec<f64>>,
-    /// One standard deviation of every nominal parameter that was re-tuned, 0 of the others.
+    /// One standard deviation of every nominal parameter; 0 for parameters that were not re-tuned.
     pub(crate) parameter_sd: Vec<f64>,
-    /// Log-likelihood against the re-tuned nominal, nats, with penalties: see [`crate::fit::score`].
+    /// Log-likelihood ratio to the re-tuned nominal simulator, nats, with penalties: see
+    /// [`crate::fit::score`].
     pub(crate) score: f64,
 }
 

@@ -1,16 +1,17 @@
-//! Which nominal parameters the data determine, and which not.
+//! Determines which nominal parameters the data determine.
 //!
-//! A fit of the nominal parameters, in units of their tolerances, has the normal matrix N = D + I:
-//! the data's information and the prior. Then
+//! A fit of the nominal parameters, in units of their tolerances, has the normal matrix N = D + I,
+//! where D is the information of the data and I that of the prior. Then
 //!
 //! ```text
 //! sd_i = sqrt((N^-1)_ii),     alone_i = 1/sqrt(D_ii + 1),     like_ij = D_ij/sqrt(D_ii D_jj)
 //! ```
 //!
-//! are a parameter's posterior standard deviation, the standard deviation if all others were known,
-//! and how alike two parameters act. Without data sd_i is 1. A parameter with D_ii = 0 does
-//! nothing; two that are alike to within the noise of the data do the same (Raue et al. 2009, doi
-//! 10.1093/bioinformatics/btp358, for the terms).
+//! sd_i is the posterior standard deviation of parameter i. alone_i is its standard deviation if
+//! all other parameters were known. like_ij tells how alike parameters i and j act: 1 or -1 if they
+//! change the outputs in proportion. Without data, sd_i is 1. A parameter with D_ii = 0 has no
+//! effect on the outputs. The terms are those of Raue et al. (2009, doi
+//! 10.1093/bioinformatics/btp358).
 
 use nalgebra::DMatrix;
 use schemars::JsonSchema;
@@ -21,17 +22,18 @@ use crate::{
     problem::{simulator::Model, spec::ParameterSpec},
 };
 
-/// A parameter is determined if it is known to this share of its tolerance, and weakly determined
-/// below the second share.
+/// A parameter is determined if its standard deviation is at most the share [`DETERMINED`] of its
+/// tolerance, and weakly determined if it is at most the share [`WEAKLY`].
 const DETERMINED: f64 = 1.0 / 3.0;
 const WEAKLY: f64 = 0.9;
-/// Information, tolerances to the minus two, below which a parameter has no visible effect.
+/// Information D_ii below which a parameter has no visible effect.
 const DEAD: f64 = 1e-6;
-/// Absolute likeness above which two parameters act alike, and the ratio of `sd` to `sd_alone`
-/// above which the other parameters blur a parameter.
+/// Two parameters act alike if the absolute value of like_ij exceeds [`ALIKE`]. A parameter is
+/// blurred by others if `sd` is more than [`BLURRED`] times `sd_alone`.
 const ALIKE: f64 = 0.98;
 const BLURRED: f64 = 2.0;
-/// A parameter is at a bound if it has gone this share of the way to it.
+/// A parameter is at a bound if it has gone this share of the way from its nominal value to the
+/// bound.
 const AT_BOUND: f64 = 0.995;
 
 /// How well a parameter is known.
@@ -121,10 +123,12 @@ impl Identified {
     }
 }
 
-/// Information of a fit about the nominal parameters that it moved: their indices, and N.
+/// Information of a fit about the nominal parameters that it moved: the indices of these
+/// parameters, and N of the module documentation.
 pub(crate) type Information = (Vec<usize>, DMatrix<f64>);
 
-/// Information of some fits about every parameter with a tolerance, in the order of the simulator.
+/// Returns how well some fits determine every parameter with a tolerance, in the order of the
+/// simulator.
 pub(crate) fn identified(
     specs: &[ParameterSpec],
     retuned: &Model,
@@ -175,7 +179,8 @@ fn is_at_bound(spec: &ParameterSpec, value: f64) -> bool {
     let reach = crate::fit::coordinate::REACH * spec.sd;
     let (low, high) =
         (spec.least.max(spec.nominal - reach), spec.greatest.min(spec.nominal + reach));
-    // A parameter whose nominal value is its bound (no friction) may stay there.
+    // A parameter whose nominal value is one of its bounds (for example no friction) may stay there
+    // without being reported as at a bound.
     let near =
         |end: f64| end != spec.nominal && (value - spec.nominal) / (end - spec.nominal) > AT_BOUND;
     near(low) || near(high)
@@ -189,7 +194,7 @@ mod tests {
     fn a_dead_one_and_two_that_do_the_same_are_told() {
         let spec = |name: &str| ParameterSpec::new(name, "1", 1.0).within(0.1);
         let specs = [spec("a"), spec("b"), spec("c"), spec("d")];
-        // a and b act alike, c does nothing, d is known well.
+        // Parameters a and b act alike, c does nothing, d is known well.
         let data =
             [[400.0, 399.9, 0.0, 0.0], [399.9, 400.0, 0.0, 0.0], [0.0; 4], [0.0, 0.0, 0.0, 1e4]];
         let normal = DMatrix::from_fn(4, 4, |i, j| data[i][j] + f64::from(u8::from(i == j)));

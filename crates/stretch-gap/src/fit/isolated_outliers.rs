@@ -1,38 +1,42 @@
 //! Finds isolated outliers: single samples, or a few in a row, that deviate from their neighbours.
-//! They are errors of the recorder, not of the rig.
+//! Such samples are errors of the recorder, not of the rig.
 //!
-//! The search is in the residual r of the re-tuned simulator, in multiples of the noise, where the
-//! motion cannot hide outliers. A sample is isolated if it deviates from both neighbours to the
-//! same side,
+//! The search is in the residual r of the re-tuned simulator, in multiples of the noise, because
+//! the motion could hide outliers in the measurement itself. A sample is isolated if it deviates
+//! from both neighbours to the same side, and if
 //!
 //! ```text
 //! min(|r_i - r_(i-1)|, |r_i - r_(i+1)|) > 8 max(1, s),     s = median of |steps| within half a second / 0.954
 //! ```
 //!
-//! with the local standard deviation s of the noise, so that a hum is not isolated. A step or a
-//! kink of a gap deviates from one neighbour only. Runs of up to [`RUN`] samples are found by
-//! `is_run`. Isolated samples get no weight, like lost ones. If more than one of [`RARE`] samples
-//! are isolated, they are not exceptions and keep their weight. If only single samples and runs
-//! together are too many, the runs keep theirs.
+//! s is the local standard deviation of the noise, so that the peaks of a hum are not isolated. Its
+//! median is over [`NEAR`] steps on either side, which is half a second in total at 100 Hz. If the
+//! gap itself has a step or a kink, a sample deviates from only one neighbour. Runs of up to
+//! [`RUN`] samples are found by `is_run`. Isolated samples get no weight, like samples that were
+//! not measured. If more than one in [`RARE`] samples is isolated, they are not exceptions and keep
+//! their weight. If only single samples and runs together exceed this limit, the runs keep their
+//! weight.
 
 use std::{collections::BTreeSet, ops::Range};
 
-/// Standard deviations beyond which a sample is isolated: one in 10^9 samples of normal noise.
+/// Smallest deviation of an isolated sample, in standard deviations. Less than one in 10^9 samples
+/// of normal noise exceeds it.
 const ALONE: f64 = 8.0;
-/// Median size of a step of white noise of one standard deviation: 0.6745 sqrt 2.
+/// Median size of the steps of white noise with standard deviation 1: 0.6745 sqrt 2.
 const MEDIAN_STEP: f64 = 0.954;
 /// Number of steps on either side from which the noise is estimated.
 const NEAR: usize = 25;
-/// Number of samples of which at most one may be isolated.
+/// At most one in this number of samples may be isolated.
 const RARE: usize = 200;
 
 /// Largest number of samples in a run.
 const RUN: usize = 5;
-/// Largest difference between the two sides of a run, as a share of its height.
+/// Largest difference between the samples before and after a run, as a share of the run's height.
 const LEVEL: f64 = 0.25;
 
-/// Returns the indices of the isolated samples of a residual, in order. `moves` are the steps of
-/// the simulated output to each sample. Both are in multiples of the noise.
+/// Returns the indices of the isolated samples of a residual, in ascending order. `moves` holds,
+/// for every sample, the step of the simulated output from the previous sample. Both are in
+/// multiples of the noise.
 pub(crate) fn isolated(
     residual: &[f64],
     moves: &[f64],
@@ -64,11 +68,13 @@ pub(crate) fn isolated(
     }
 }
 
-/// Whether the samples between the first and the last one of a span are an isolated run (an
-/// encoder's glitch). All of them must deviate as far as a single sample does, to one side of both
-/// ends of the span. The ends may differ by a quarter of that height at most. The simulator may
-/// move by at most a quarter of it on either side of the run: a late or missing response to a
-/// command also leaves a few samples in a row, but there the simulator has a step.
+/// Whether the samples between the first and the last sample of `span` are an isolated run (for
+/// example a glitch of an encoder). All of them must deviate from both ends of the span to the same
+/// side, at least as far as an isolated single sample does. The smallest of these deviations is the
+/// height of the run. The two ends may differ by at most a quarter of the height. The simulated
+/// output may step by at most a quarter of the height at the beginning and at the end of the run.
+/// Without this condition, a late or missing response to a command would also count, because it
+/// leaves a few deviating samples in a row.
 fn is_run(r: &[f64], moves: &[f64], steps: &[f64], span: Range<usize>) -> bool {
     let (before, after) = (span.start, span.end);
     if after >= r.len() {
@@ -81,7 +87,7 @@ fn is_run(r: &[f64], moves: &[f64], steps: &[f64], span: Range<usize>) -> bool {
     height > ALONE && beside <= LEVEL * height && height > ALONE * deviation(steps, before)
 }
 
-/// Estimates the standard deviation of the noise from the steps around one of them.
+/// Estimates the standard deviation of the noise from the steps near the step with the index `at`.
 fn deviation(steps: &[f64], at: usize) -> f64 {
     let near = &steps[at.saturating_sub(NEAR)..(at + NEAR + 2).min(steps.len())];
     let mut sizes: Vec<f64> = near.iter().map(|d| d.abs()).collect();
@@ -124,7 +130,7 @@ mod tests {
             record[place] += 20.0;
         }
         assert_eq!(none_of(&record), places);
-        // One in a hundred is no exception.
+        // If one in a hundred samples deviates, it is not an exception.
         let often: Vec<f64> = noise(count)
             .iter()
             .enumerate()
@@ -133,8 +139,8 @@ mod tests {
         assert!(none_of(&often).is_empty());
     }
 
-    /// Two to five samples in a row are found at any level. Six are an event of the rig, and so is
-    /// a signal that does not come back.
+    /// Two to five samples in a row are found at any level. Six in a row, or a signal that does not
+    /// come back, are an event of the rig.
     #[test]
     fn a_few_values_in_a_row_are_found_and_what_lasts_longer_is_left() {
         for (length, height) in [(2, 30.0), (3, -25.0), (4, 1e6), (5, 40.0)] {
@@ -159,7 +165,7 @@ mod tests {
         // Jumps of a worn contact: three samples in every 150.
         let jumps = added(&|i| 40.0 * f64::from(i % 150 < 3));
         assert!(none_of(&jumps).is_empty());
-        // If there are too many runs, the single values are still found.
+        // If there are too many runs, isolated single samples are still found.
         let both = added(&|i| 40.0 * f64::from(i % 150 < 3) + 40.0 * f64::from(i == 1000));
         assert_eq!(none_of(&both), [1000]);
     }

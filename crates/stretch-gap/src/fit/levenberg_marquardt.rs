@@ -7,18 +7,20 @@
 //! J(x) = 0.5/b sum over stages r' V^-1 r - sum ln p(x_i)
 //! ```
 //!
-//! where b, the samples of a block, keeps neighbours from counting as independent.
-//! Levenberg-Marquardt (Marquardt 1963, doi 10.1137/0111030) minimises it. With sensitivities A =
-//! -dr/dx, its step d is
+//! where b is the number of samples in a block: a block counts as one observation, because
+//! neighbouring samples are correlated. The method of Levenberg and Marquardt (Marquardt 1963, doi
+//! 10.1137/0111030) minimises J. P is -sum ln p(x_i). With sensitivities A = -dr/dx and the damping
+//! lambda, the step d solves
 //!
 //! ```text
 //! (N + lambda diag N) d = -g,    N = A'V^-1 A/b + P'',    g = -A'V^-1 r/b + P',    low <= x + d <= high
 //! ```
 //!
-//! Each damped step is solved *within* its bounds ([`boxed`]). Clipping it to them instead would
-//! leave the face along which the cost still falls. Sensitivities to nominal parameters change
-//! little and cost one simulation each, so they are renewed at a few iterations only. Those to
-//! parameters of effects are renewed at every iteration, unless their runs are costly.
+//! Each damped step is computed *within* the bounds ([`boxed`]). If an unbounded step were clipped
+//! to the bounds instead, the fit could stop although the cost still falls along a bound.
+//! Sensitivities to nominal parameters change little and cost one simulation each, so they are
+//! renewed only at a few iterations. Sensitivities to parameters of effects are renewed at every
+//! iteration, unless the runs of the effect are costly.
 //!
 //! Effects and nominal parameters must be fitted together. Otherwise an effect is credited with
 //! what the fixed nominal parameters could have explained (Brynjarsdottir and O'Hagan 2014, doi
@@ -41,11 +43,11 @@ use crate::{
     problem::{error::GapError, simulator::Model},
 };
 
-/// A fit of some stages with some effects.
+/// Result of a fit of some stages with some effects.
 #[derive(Debug, Clone)]
 pub(crate) struct Fitted {
     pub(crate) model: Model,
-    /// J of the module's head.
+    /// J of the module documentation.
     pub(crate) cost: f64,
     /// The misfit of each stage that was fitted.
     pub(crate) misfits: Vec<Misfit>,
@@ -55,67 +57,69 @@ pub(crate) struct Fitted {
     pub(crate) parameter_sd: Vec<(usize, f64)>,
     /// The coordinates that were fitted, with their bounds.
     pub(crate) coordinates: Vec<(Coordinate, [f64; 2])>,
-    /// N of the module's head.
+    /// N of the module documentation.
     pub(crate) normal: DMatrix<f64>,
-    /// Whether it stopped with sensitivities that were all simulated at its last point. A further
-    /// fit from there would end at once.
+    /// Whether the fit stopped with sensitivities that were all simulated at its last point. A
+    /// further fit from this point would end at once.
     pub(crate) is_settled: bool,
     /// Fall of the cost in the last iteration, nats.
     pub(crate) last_fall: f64,
 }
 
-/// How much work may go into a fit.
+/// Limits of the work that a fit may do.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Effort {
-    /// Most iterations.
+    /// Largest number of iterations.
     iterations: usize,
     /// Iterations at which the sensitivities to the nominal parameters are renewed.
     renewals: &'static [usize],
     /// Whether the simulator may answer runs from a linearisation around the nominal parameters at
     /// which the fit starts.
     is_rough: bool,
-    /// Whether the forms of effects keep the values of the start.
+    /// Whether the forms of effects keep the values of the starting model.
     holds_forms: bool,
 }
 
-/// Enough to compare several starts.
+/// Effort that suffices to compare several starts.
 pub(crate) const GLANCE: Effort =
     Effort { iterations: 2, renewals: &[], is_rough: true, holds_forms: false };
-/// Enough to see whether a candidate can compete.
+/// Effort that suffices to see whether a candidate can compete.
 pub(crate) const COARSE: Effort =
     Effort { iterations: 5, renewals: &[2], is_rough: true, holds_forms: false };
-/// Enough to converge.
+/// Effort that suffices to converge.
 pub(crate) const FINE: Effort =
     Effort { iterations: 14, renewals: &[1, 3, 6, 9], is_rough: false, holds_forms: false };
-/// Enough to converge, with fixed forms of effects.
+/// Effort that suffices to converge with fixed forms of effects.
 pub(crate) const FINE_OF_FORM: Effort = Effort { holds_forms: true, ..FINE };
 
-/// No step: only the misfit of a model, and how well its parameters are known there.
+/// Effort without a step: computes only the misfit of a model, and how well its parameters are
+/// known.
 pub(crate) const HELD: Effort =
     Effort { iterations: 0, renewals: &[], is_rough: false, holds_forms: false };
 
-/// Added to every diagonal element, because a coordinate that does nothing has no curvature.
+/// Added to every diagonal element of N, because a coordinate without influence has no curvature.
 const RIDGE: f64 = 1e-12;
-/// Dampings tried in one iteration.
+/// Number of dampings that are tried in one iteration.
 const TRIES: usize = 5;
-/// Fall of the cost in one iteration below which it has gained nothing: in nats, plus a share of
-/// the cost.
+/// An iteration has gained nothing if the cost falls by less than the first number, in nats, plus
+/// the second number times the cost.
 const LEAST_GAIN: (f64, f64) = (0.03, 2e-5);
 
 impl Comparison<'_> {
-    /// J of the module's head at a model, from the residuals of its stages.
+    /// Returns J of the module documentation for a model, from the residuals of its stages.
     pub(crate) fn cost(&self, stages: &[usize], model: &Model, residuals: &[Vec<f64>]) -> f64 {
         let column = |(&s, r): (&usize, &Vec<f64>)| self.metrics[s].column(&self.roles, r.clone());
         let columns: Vec<Column> = stages.iter().zip(residuals).map(column).collect();
         self.cost_of(stages, model, &columns.iter().collect::<Vec<_>>())
     }
 
-    /// The same, from residuals that are ready for products.
+    /// The same as [`Comparison::cost`], from residuals that are prepared for products.
     pub(crate) fn cost_of(&self, stages: &[usize], model: &Model, residuals: &[&Column]) -> f64 {
         cost(self, (stages, &coordinates(self.simulator(), stages, model)), model, residuals)
     }
 
-    /// Fits from a starting model. `known` holds sensitivities of the nominal parameters near the start, by stage.
+    /// Fits from a starting model. `known` holds, by stage, sensitivities to the nominal parameters
+    /// near the starting model.
     pub(crate) fn fit(
         &self,
         stages: &[usize],
@@ -140,7 +144,7 @@ impl Comparison<'_> {
             descent.last_fall = before - descent.cost;
             let is_still = descent.last_fall < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
             descent.is_settled = is_still && renew && self.simulator().model_runs().is_none();
-            // Without progress, old sensitivities may be the only reason.
+            // If there is no progress with old sensitivities, renew them before giving up.
             if is_still && (renew || (!has_moved && descent.lambda > 1e3)) {
                 break;
             }
@@ -148,7 +152,8 @@ impl Comparison<'_> {
         Ok(descent.finish())
     }
 
-    /// The same, after the simulator is linearised around the start.
+    /// The same as [`Comparison::fit`], after the simulator has been linearised around the starting
+    /// model.
     pub(crate) fn fit_linearised(
         &self,
         stages: &[usize],
@@ -175,8 +180,8 @@ impl Fitted {
     }
 }
 
-/// Returns J of the module's head for some stages and their coordinates, at a model that leaves
-/// these residuals.
+/// Returns J of the module documentation for some stages and their coordinates, for a model that
+/// leaves these residuals.
 fn cost(
     compare: &Comparison<'_>,
     (stages, coordinates): (&[usize], &[(Coordinate, [f64; 2])]),
@@ -189,7 +194,8 @@ fn cost(
     0.5 * compare.weight() * data + prior
 }
 
-/// Collects the fits that succeeded. A failed simulation excludes its candidate; a stop ends all.
+/// Collects the fits that succeeded. A failed simulation excludes its candidate; a request to stop
+/// ends all fits.
 pub(crate) fn possible<T: Send>(
     fits: impl ParallelIterator<Item = Result<T, GapError>>,
 ) -> Result<Vec<T>, GapError> {
@@ -205,7 +211,7 @@ pub(crate) fn possible<T: Send>(
     Ok(out)
 }
 
-/// A fit under way.
+/// State of a running fit.
 struct Descent<'a, 'b> {
     compare: &'a Comparison<'b>,
     stages: &'a [usize],
@@ -218,11 +224,11 @@ struct Descent<'a, 'b> {
     cost: f64,
     /// Sensitivities by coordinate, then by stage; `None` if a coordinate does not act.
     columns: Vec<Vec<Option<Column>>>,
-    /// N, undamped.
+    /// N without damping.
     normal: DMatrix<f64>,
     gradient: Vec<f64>,
     lambda: f64,
-    /// As those of [`Fitted`].
+    /// As the fields of [`Fitted`] with the same names.
     is_settled: bool,
     last_fall: f64,
 }
@@ -269,7 +275,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         columns.map(|(&s, v)| Ok(self.compare.metrics[s].column(&self.compare.roles, v?))).collect()
     }
 
-    /// J of the module's head.
+    /// J of the module documentation.
     fn cost_of(&self, model: &Model, residuals: &[Column]) -> f64 {
         cost(self.compare, (self.stages, &self.coordinates), model, residuals)
     }
@@ -308,7 +314,7 @@ impl<'a, 'b> Descent<'a, 'b> {
         Ok(())
     }
 
-    /// Whether a coordinate belongs to an effect of which every value needs a costly run.
+    /// Whether a coordinate belongs to an effect that needs a costly run for every parameter value.
     fn is_costly(&self, coordinate: Coordinate) -> bool {
         match coordinate {
             Coordinate::Nominal { .. } => false,
@@ -362,8 +368,8 @@ impl<'a, 'b> Descent<'a, 'b> {
                 damped[(i, i)] += self.lambda * self.normal[(i, i)] + RIDGE;
             }
             let step = boxed(&damped, &self.gradient, &low, &high);
-            // If runs are counted, make none for a step that the linearised model predicts to gain
-            // nothing.
+            // If runs are counted, do not spend one on a step that, according to the linearised
+            // model, gains nothing.
             if is_counted && self.predicted_fall(&step) < LEAST_GAIN.0 + LEAST_GAIN.1 * self.cost {
                 return Ok(false);
             }
@@ -389,7 +395,8 @@ impl<'a, 'b> Descent<'a, 'b> {
         Ok(false)
     }
 
-    /// Fall of the cost that the linearised residuals predict for a step: -(g'd + d'N d/2).
+    /// Returns the fall of the cost that the linearised residuals predict for a step d: -(g'd + d'N
+    /// d/2).
     fn predicted_fall(&self, step: &[f64]) -> f64 {
         let d = DVector::from_column_slice(step);
         let slope: f64 = self.gradient.iter().zip(step).map(|(g, s)| g * s).sum();

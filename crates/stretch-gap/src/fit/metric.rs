@@ -1,15 +1,18 @@
-//! The metric of one stage: residuals in multiples of the noise, nuisances marginalised.
+//! The metric of one stage: the covariance by which residuals are weighed. Residuals are in
+//! multiples of the noise, and nuisances (slow drift and offsets) are marginalised.
 //!
-//! Within one segment the residual r has the covariance V = I + C P^-1 C' of the [nuisance](crate::fit::nuisance): white noise
-//! of variance 1, and what slow drift and offsets of parameters may change. Segments are independent, so that the squared Mahalanobis
+//! Within one segment of the recording, the residual r has the covariance V = I + C P^-1 C' of
+//! [`nuisance`](crate::fit::nuisance): white noise of variance 1, and the changes that slow drift
+//! and offsets of parameters may cause. Segments are independent, so that the squared Mahalanobis
 //! length of a residual, its chi-square, is
 //!
 //! ```text
 //! chi^2 = sum over segments of r' V^-1 r
 //! ```
 //!
-//! and products x'V^-1 y of sensitivities make the normal equations of every fit. This is the generative discrepancy of
-//! Kennedy and O'Hagan (2001, doi 10.1111/1467-9868.00294), confined to what the simulator's own parameters could do.
+//! Products x'V^-1 y of sensitivities are the elements of the normal equations of every fit. The
+//! nuisances are a model discrepancy as in Kennedy and O'Hagan (2001, doi 10.1111/1467-9868.00294),
+//! but limited to changes that the simulator's own parameters could cause.
 
 use std::sync::Arc;
 
@@ -39,32 +42,35 @@ pub(crate) struct Metric {
     nuisances: Vec<Option<Nuisance>>,
 }
 
-/// A parameter that drifts or has an offset in each trial, or the recorder if it may drift.
+/// A loose parameter, i.e. one that drifts or has an offset in each trial; or the recorder, if it
+/// may drift.
 #[derive(Debug, Clone)]
 pub(crate) struct Loose {
     /// Index of the parameter; `None` for the recorder.
     pub(crate) parameter: Option<usize>,
-    /// Change of the output, in multiples of the noise, for one standard deviation as the simulator describes it.
+    /// Change of the output, in multiples of the noise, if the parameter changes by one standard
+    /// deviation of its drift or offset in the simulator's description.
     column: Arc<[f64]>,
     /// See [`RecordFacts::drift_clocks`](crate::RecordFacts::drift_clocks).
     clock: Arc<[u32]>,
     /// The slow drift of the parameter as the simulator describes it; none for an offset.
     pub(crate) drift: Option<SlowDrift>,
-    /// Whether each tick of the clock has a separate offset, as large as the simulator describes it.
+    /// Whether there is a separate offset for each tick of the clock, with the size in the
+    /// simulator's description.
     pub(crate) is_by_tick: bool,
-    /// Assumed size and correlation time of the drift.
+    /// Assumed size and correlation time of the drift or offset.
     pub(crate) level: Level,
-    /// The drift's knots by segment; none for an offset.
+    /// Knots of the drift by segment; none for an offset.
     knots: Arc<[Arc<Knots>]>,
 }
 
-/// The knots of a clock by segment.
+/// Returns the knots of a clock by segment.
 fn knots_of(clock: &[u32], roles: &SampleRoles, dt_s: f64) -> Arc<[Arc<Knots>]> {
     roles.segments.iter().map(|s| Arc::new(Knots::of(&clock[s.from..s.to], dt_s))).collect()
 }
 
-/// Size of a nuisance, as a multiple of what the simulator describes (0 without a nuisance), and
-/// its correlation time, s (meaningless for an offset).
+/// Size of a nuisance, as a multiple of the size in the simulator's description (0 for no
+/// nuisance), and its correlation time, s (meaningless for an offset).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Level {
     pub(crate) size: f64,
@@ -76,18 +82,19 @@ impl Level {
     pub(crate) const NONE: Self = Self { size: 0.0, time_s: 1.0 };
 }
 
-/// A residual or a sensitivity over whole segments, in multiples of the noise, ready for products.
+/// A residual or a sensitivity over whole segments, in multiples of the noise, prepared for
+/// products in the metric.
 #[derive(Debug, Clone)]
 pub(crate) struct Column {
     pub(crate) values: Vec<f64>,
-    /// L^-1 C'x by segment.
+    /// L^-1 C'x by segment, with L and C of [`nuisance`](crate::fit::nuisance).
     tails: Vec<Vec<f64>>,
 }
 
 impl Metric {
-    /// Computes the metric of a stage around a model. Its sensitivities to the parameters that
-    /// drift or have an offset in each trial determine which part of a residual these can explain.
-    /// The nuisances have the sizes that the simulator describes, or those of `like`, if given.
+    /// Computes the metric of a stage around a model. The sensitivities of the stage to its loose
+    /// parameters determine which part of a residual the nuisances can explain. The nuisances have
+    /// the sizes in the simulator's description, or those of `like`, if given.
     pub(crate) fn of(
         runs: &Runs<'_>,
         roles: &SampleRoles,
@@ -195,7 +202,7 @@ impl Metric {
         &self.nuisances
     }
 
-    /// The metric with every loose parameter at another level.
+    /// Returns the metric with another level for every loose parameter.
     pub(crate) fn with(&self, level: impl Fn(usize, Level) -> Level, roles: &SampleRoles) -> Self {
         let (noise, loose) = (self.noise.clone(), self.loose.clone());
         let mut other = Self { noise, loose, nuisances: Vec::new() };
@@ -205,7 +212,7 @@ impl Metric {
         other
     }
 
-    /// A column of values in multiples of the noise over the first trials.
+    /// Returns a column of values, in multiples of the noise, that cover the first trials.
     pub(crate) fn column(&self, roles: &SampleRoles, values: Vec<f64>) -> Column {
         let tails = roles
             .segments
@@ -221,7 +228,7 @@ impl Metric {
         Column { values, tails }
     }
 
-    /// x'V^-1 y over the segments in a role.
+    /// Returns x'V^-1 y over the segments in a role.
     pub(crate) fn product(&self, roles: &SampleRoles, x: &Column, y: &Column, role: Role) -> f64 {
         let mut sum = 0.0;
         for (i, segment) in roles.segments.iter().enumerate() {
@@ -235,20 +242,21 @@ impl Metric {
         sum
     }
 
-    /// Samples in a role that count: lost ones and isolated outliers, whose noise is infinite, do not.
+    /// Returns the number of samples in a role that count. Samples that were not measured and
+    /// isolated outliers, whose noise is infinite, do not count.
     pub(crate) fn measured(&self, roles: &SampleRoles, role: Role) -> usize {
         let own = roles.of_role(role).flat_map(|s| &self.noise.sd[s.from..s.to]);
         own.filter(|sd| sd.is_finite()).count()
     }
 
-    /// ln det V over the segments in a role.
+    /// Returns ln det V, summed over the segments in a role.
     pub(crate) fn ln_det(&self, roles: &SampleRoles, role: Role) -> f64 {
         let pairs = roles.segments.iter().zip(&self.nuisances).filter(|(s, _)| s.role == role);
         pairs.filter_map(|(_, nuisance)| Some(nuisance.as_ref()?.ln_determinant())).sum()
     }
 
-    /// Returns 2 sum ln s over the segments in a role, with noise s: what has to be added to ln det
-    /// V to express it in the unit of the output.
+    /// Returns 2 sum ln s over the samples in a role, with the noise s of each sample. Added to ln
+    /// det V, it gives the determinant in the unit of the output.
     pub(crate) fn ln_noise(&self, roles: &SampleRoles, role: Role) -> f64 {
         let own = roles.segments.iter().filter(|s| s.role == role);
         let sds = own.flat_map(|s| &self.noise.sd[s.from..s.to]).filter(|sd| sd.is_finite());
@@ -267,7 +275,7 @@ impl Metric {
 
 #[cfg(test)]
 impl Metric {
-    /// One parameter that drifts in one trial.
+    /// Returns a metric with one parameter that drifts in one trial.
     pub(crate) fn with_drift(
         noise: NoiseLevel,
         column: Vec<f64>,

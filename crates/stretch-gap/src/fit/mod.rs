@@ -1,17 +1,17 @@
 //! Fits hypotheses and scores them.
 //!
-//! Input: the runs of a problem and the roles of its samples. Output: a re-tuned
-//! [`prepared::PreparedProblem`], in which any set of effects becomes a [`hypothesis::Hypothesis`]:
-//! a model, its misfit in every stage, and a score. In the order of use: the noise of every stage
-//! ([`noise_level`], [`isolated_outliers`]); residuals with slow drift and offsets marginalised
-//! ([`metric`], [`nuisance`], [`hyper_parameters`]), and with a recorder's drift only if they do
-//! not depend on the [`motion`]; residuals and sensitivities of the stages ([`comparison`]);
-//! bounded Levenberg-Marquardt in scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced
-//! chi-square and scores ([`score`], [`octaves`]); errors that outputs share ([`alike`]);
-//! deviations of the forms of effects ([`deviations`]); which parameters the data determine
-//! ([`identifiability`]); whether a drift oscillates ([`swing`]); re-tuning from several starts
-//! ([`starts`]); a fit of selected samples after a diagnosis ([`sample_fit`]). Imports: `numerics`,
-//! `problem`.
+//! Input: the simulator with its runs, and the roles of the samples. Output: a re-tuned
+//! [`prepared::PreparedProblem`]. With it, any set of effects can be fitted, which yields a
+//! [`hypothesis::Hypothesis`]: a model, its misfit in every stage, and a score. The modules, in the
+//! order of use: the noise of every stage ([`noise_level`], [`isolated_outliers`]); residuals with
+//! slow drift and offsets marginalised ([`metric`], [`nuisance`], [`hyper_parameters`]); a test of
+//! whether a residual depends on the [`motion`], in which case no drift of the recorder is assumed;
+//! residuals and sensitivities of the stages ([`comparison`]); bounded Levenberg-Marquardt fits in
+//! scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced chi-square and scores ([`score`],
+//! [`octaves`]); errors that several outputs have in common ([`alike`]); deviations of the forms of
+//! effects ([`deviations`]); which parameters the data determine ([`identifiability`]); whether a
+//! drift oscillates ([`swing`]); re-tuning from several starts ([`starts`]); a fit of selected
+//! samples after a diagnosis ([`sample_fit`]). Uses the modules `numerics` and `problem`.
 
 pub(crate) mod alike;
 pub(crate) mod comparison;

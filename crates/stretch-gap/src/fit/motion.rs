@@ -1,36 +1,40 @@
-//! Whether a residual depends on the motion.
+//! Tests whether a residual depends on the motion.
 //!
 //! The noise of a recorder does not depend on the position or the direction of the machine; the
-//! residual of a missing effect does. With cells c of level and direction of the simulated output,
-//! and the sums S_bc of the residual over parts b of the recording,
+//! residual of a missing effect does. The samples are divided into cells c by level and direction
+//! of the simulated output, and into parts b of 10 s of the recording. Cell c has n_c samples. With
+//! the sum S_bc of the residual over the samples in part b and cell c, the statistic
 //!
 //! ```text
 //! T(e) = sum over c of ( sum over b of e_b S_bc )^2 / n_c,     e_b = +1 or -1
 //! ```
 //!
-//! has the same distribution for all signs e if the residual of each part is as likely as its
-//! negative, however it is correlated within the part (randomisation test; Davison and Hinkley
-//! 1997, section 4.3). The mean of each part is subtracted first, because a drift slower than a
-//! part would correlate neighbouring parts.
+//! has the same distribution for all signs e if in each part the residual is as likely as its
+//! negative, whatever its autocorrelation within the part is. Therefore T with all signs positive
+//! is compared with T for random signs (randomisation test; Davison and Hinkley 1997, section 4.3).
+//! The mean of each part is subtracted first, because a drift slower than a part would correlate
+//! neighbouring parts.
 
 use crate::{numerics::random::RandomGenerator, problem::sample_roles::SampleRoles};
 
-/// Bins of the output's range.
+/// Number of bins into which the output's range is divided.
 const BINS: usize = 24;
-/// Cells: bins at rest, falling and rising.
+/// Number of cells: each bin has one for rest, one for falling and one for rising output.
 const CELLS: usize = 3 * BINS;
 /// Length of a part, s.
 const PART_S: f64 = 10.0;
 /// Smallest number of parts for the test.
 const LEAST_PARTS: usize = 8;
-/// Draws of signs.
+/// Number of draws of the signs.
 const DRAWS: usize = 399;
 /// Significance level: largest share of draws whose T is at least as large.
 const RARE: f64 = 0.01;
-/// Smallest variance of the part of the residual that depends on the motion, in variances of the
-/// noise. Any machine has faint unmodelled effects, and a long recording shows them.
+/// Smallest variance that counts of the part of the residual that depends on the motion, in
+/// variances of the noise. Any machine has faint unmodelled effects, and in a long recording they
+/// would be significant.
 const LEAST_VARIANCE: f64 = 0.05;
-/// Change of the output within a block, as a share of its range, up to which it is at rest.
+/// Largest change of the output within a block for which the output is at rest, as a share of its
+/// range.
 const AT_REST: f64 = 1e-3;
 
 /// Whether a residual, in multiples of the noise, depends significantly on the level or the
@@ -84,7 +88,7 @@ fn cells(roles: &SampleRoles, samples: usize, output: &[f64]) -> Vec<usize> {
     cells
 }
 
-/// n_c, and S_bc by part.
+/// Returns n_c, and S_bc by part, as defined in the module documentation.
 fn sums(
     roles: &SampleRoles,
     residual: &[f64],
@@ -118,7 +122,8 @@ mod tests {
 
     const TRIAL: usize = 6_000;
 
-    /// Whether noise, a drift and a ripple over the position in six trials of a minute depend on the motion.
+    /// Tests a residual of noise, drift and a ripple that depends on the position, in six trials of
+    /// one minute each.
     fn depends(seed: u64, drift: f64, time_s: f64, ripple: impl Fn(f64, bool) -> f64) -> bool {
         let mut random = RandomGenerator::new(3, seed);
         let kept = (-0.01 / time_s).exp();
@@ -147,7 +152,7 @@ mod tests {
         let times_s = [0.3, 1.0, 3.0, 12.0, 30.0];
         let alarms = (0..100).zip(times_s.into_iter().cycle());
         let alarms = alarms.filter(|(seed, time_s)| depends(*seed, 0.7, *time_s, |_, _| 0.0));
-        // one in a hundred is expected
+        // One false alarm in a hundred is expected.
         assert!(alarms.count() <= 4);
     }
 

@@ -1,11 +1,13 @@
-//! Estimates the noise of every stage: what no deterministic model could remove.
+//! Estimates the noise of every stage: the part of its output that no deterministic model could
+//! reproduce.
 //!
 //! ```text
 //! sigma_i^2 = sigma_own^2 + mean over draws and neighbours of (f(x + noise)_i - f(x)_i)^2
 //! ```
 //!
-//! A stage f runs on its *measured* input x (teacher forcing), and transmits the noise of x. This
-//! error in variables would look like a gap where the output is steep.
+//! sigma_own is the noise of the output itself. The second part is the transmitted noise: a stage f
+//! runs on its *measured* input x (teacher forcing) and passes the noise of x on to its output.
+//! Without this part, the noise of the input would look like a gap where the output is steep.
 
 use std::ops::Range;
 
@@ -37,7 +39,7 @@ pub(crate) struct NoiseLevel {
     pub(crate) isolated: usize,
 }
 
-/// Draws of the inputs' noise.
+/// Number of draws of the noise of the inputs.
 const DRAWS: u64 = 12;
 /// Half-width over which the transmitted variance is averaged, in samples.
 const NEAR: usize = 12;
@@ -47,9 +49,9 @@ const NEAR: usize = 12;
 /// The variance is a sum of two parts. The first is the output's own noise: known, or estimated
 /// from the second differences of the recording, or from those of the residual if these are clearly
 /// smaller. The second is the *transmitted noise*, the part of the measured input's noise that
-/// reaches the output. It is computed by Monte Carlo with the same draws for every model, and
-/// sample by sample, because it is larger where the output is steep or the input is too fast to be
-/// smoothed.
+/// reaches the output. It is computed by Monte Carlo with the same draws for every model. It
+/// differs from sample to sample, because it is larger where the output is steep or the input is
+/// too fast to be smoothed.
 pub(crate) fn noise_levels(
     runs: &Runs<'_>,
     roles: &SampleRoles,
@@ -95,14 +97,14 @@ fn noise_level(
     for trial in &trials {
         let part = &arrived[trial.clone()];
         for i in 0..part.len() {
-            // A dozen draws determine a variance to 40 % only, so average over neighbours in the
-            // same trial.
+            // Twelve draws determine a variance only to 40 %, so average over neighbouring samples
+            // in the same trial.
             let near = &part[i.saturating_sub(NEAR)..(i + NEAR + 1).min(part.len())];
             let local = near.iter().sum::<f64>() / near.len() as f64;
             sd.push((own + local).sqrt().max(1e-12));
         }
     }
-    // Samples that were not measured, and isolated outliers, get no weight.
+    // Samples that were not measured get no weight; nor do isolated outliers (below).
     for (sd, _) in sd.iter_mut().zip(&simulator.record().is_lost).filter(|(_, lost)| **lost) {
         *sd = f64::INFINITY;
     }
@@ -117,7 +119,8 @@ fn noise_level(
     Ok(NoiseLevel { sd, rms, source, known_to, isolated })
 }
 
-/// Variance that the measured input's noise causes at every sample of the output, which is `undisturbed` without it.
+/// Returns the variance that the measured input's noise causes at every sample of the output.
+/// `undisturbed` is the output without this noise.
 fn transmitted(
     runs: &Runs<'_>,
     stage: usize,
@@ -135,7 +138,7 @@ fn transmitted(
             *sum += (a - b) * (a - b) / DRAWS as f64;
             any |= a != b;
         }
-        // A stage whose input is commanded transmits nothing.
+        // A stage whose input is a command transmits no noise.
         if !any {
             break;
         }

@@ -1,16 +1,18 @@
-//! Nuisances of one stretch of samples: slow drift and trial offsets of parameters, marginalised out of a residual.
+//! Marginalises the nuisances (slow drift and trial offsets of parameters) out of the residual in
+//! one segment of samples.
 //!
-//! The columns C are the changes that the nuisances can make (in multiples of the noise, per unit
-//! of each). With amplitudes b of prior precision P and white noise of unit variance, a residual r
-//! has the covariance V = I + C P^-1 C'. By the matrix inversion lemma
+//! A column of C is the change of the output by a nuisance of unit amplitude, in multiples of the
+//! noise. With amplitudes b of prior precision P and white noise of variance 1, a residual r has
+//! the covariance V = I + C P^-1 C'. By the matrix inversion lemma
 //!
 //! ```text
 //! x' V^-1 y = x'y - (L^-1 C'x)' (L^-1 C'y),     L L' = C'C + P
 //! ```
 //!
-//! (Rasmussen and Williams 2006, appendix A.3). A product of two columns therefore costs a
-//! projection and a triangular solve each, and never a matrix as large as the recording. The most
-//! likely amplitudes, with which a residual is cleaned, are b = (C'C + P)^-1 C'r.
+//! (Rasmussen and Williams 2006, appendix A.3). Therefore a product of two columns x and y needs
+//! one projection and one triangular solve for each of them, but no matrix as large as the
+//! recording. A residual is cleaned by subtracting C b with the most likely amplitudes b = (C'C +
+//! P)^-1 C'r.
 
 use std::{ops::Range, sync::Arc};
 
@@ -19,8 +21,8 @@ use crate::numerics::{
     linear::dot,
 };
 
-/// Distance of the knots, s. The process is rough, and straight lines between wide knots would
-/// attribute its fast part to a quicker process.
+/// Distance of the knots, s. Drift is a rough process (Ornstein-Uhlenbeck). Straight lines between
+/// knots that are farther apart would make a fast drift look even faster.
 const KNOT_S: f64 = 0.1;
 
 /// Nuisances of one segment of one stage.
@@ -30,12 +32,12 @@ pub(super) struct Nuisance {
     offsets: Vec<Patch>,
     /// Columns of parameters that drift.
     drifting: Vec<Drifting>,
-    /// L of the module's head.
+    /// L of the module documentation.
     factor: ArrowFactor,
     ln_determinant: f64,
 }
 
-/// Sensitivity to an offset from one sample on, as long as it lasts.
+/// Sensitivity to an offset, from the sample `from` to the end of the offset.
 #[derive(Debug, Clone)]
 pub(super) struct Patch {
     pub(super) from: usize,
@@ -61,11 +63,11 @@ impl Patch {
     }
 }
 
-/// Sensitivity to a drifting parameter, and the knots that each sample lies between.
+/// Sensitivity to a drifting parameter, and the two knots between which each sample lies.
 ///
-/// The drift is linear between knots: sample i at the share w between knots k and k + 1 moves by
-/// s_i ((1 - w) b_k + w b_(k+1)). The clock of a sample is the last time at which the drift could
-/// reach the output.
+/// The drift is linear between knots. If sample i lies between knots k and k + 1, at the share w of
+/// the way, it changes by s_i ((1 - w) b_k + w b_(k+1)). The position between knots is computed
+/// from the clock of the sample: the last time at which the drift could reach the output.
 #[derive(Debug, Clone)]
 pub(super) struct Drifting {
     sensitivity: Vec<f64>,
@@ -78,15 +80,15 @@ pub(super) struct Drifting {
 /// The knots of a drift in one segment.
 #[derive(Debug)]
 pub(super) struct Knots {
-    /// By sample: knot before, and share of the way to the next.
+    /// By sample: index of the knot before it, and the share of the way to the next knot.
     place: Vec<(u32, f64)>,
     count: usize,
-    /// Time between two, s.
+    /// Time between two knots, s.
     step_s: f64,
 }
 
 impl Knots {
-    /// Computes the knots of a clock that counts samples of `dt_s`.
+    /// Computes the knots for a clock that counts samples; `dt_s` is the sample time.
     pub(super) fn of(clock: &[u32], dt_s: f64) -> Self {
         let knot = ((KNOT_S / dt_s) as usize).max(1);
         let first = clock.first().copied().unwrap_or(0);
@@ -103,13 +105,14 @@ impl Knots {
 }
 
 impl Drifting {
-    /// A drift of variance 1 and correlation time `time_s`.
+    /// Creates a drift of variance 1 and correlation time `time_s`.
     pub(super) fn new(sensitivity: Vec<f64>, knots: Arc<Knots>, time_s: f64) -> Self {
         let kept = (-knots.step_s / time_s).exp();
         Self { sensitivity, knots, kept }
     }
 
-    /// Sample, knot, weights of that knot and the next.
+    /// Returns, for each sample: its index, the index of the knot before it, and the weights of
+    /// this knot and the next.
     fn each(&self) -> impl Iterator<Item = (usize, usize, f64, f64)> {
         self.within(0..self.sensitivity.len())
     }
@@ -125,32 +128,35 @@ impl Drifting {
 impl Nuisance {
     pub(super) fn new(offsets: Vec<Patch>, drifting: Vec<Drifting>) -> Self {
         let factor = precision(&offsets, &drifting).factor();
-        // ln det P of chains of correlation rho with variance 1: -(K - 1) ln(1 - rho^2).
+        // Each drift has K knots of variance 1, with the correlation rho between neighbours. Its ln
+        // det P is -(K - 1) ln(1 - rho^2).
         let prior = |w: &Drifting| -(w.knots.count as f64 - 1.0) * (1.0 - w.kept * w.kept).ln();
         let prior: f64 = drifting.iter().map(prior).sum();
         let ln_determinant = factor.ln_determinant() - prior;
         Self { offsets, drifting, factor, ln_determinant }
     }
 
-    /// ln det V = ln det(C'C + P) - ln det P.
+    /// Returns ln det V = ln det(C'C + P) - ln det P.
     pub(super) fn ln_determinant(&self) -> f64 {
         self.ln_determinant
     }
 
-    /// L^-1 C'x: the part of a product of columns that the nuisances explain.
+    /// Returns L^-1 C'x. The scalar product of two of these vectors is the part of a product of
+    /// columns that the nuisances explain.
     pub(super) fn tail(&self, x: &[f64]) -> Vec<f64> {
         let mut tail = project(&self.offsets, &self.drifting, x);
         self.factor.forward(&mut tail);
         tail
     }
 
-    /// Time between knots, s, and C'x at the knots of the drift with that index.
+    /// Returns the time between knots, s, and C'x at the knots of the drift with the index `which`.
     pub(super) fn at_knots(&self, which: usize, x: &[f64]) -> (f64, Vec<f64>) {
         let drifting = &self.drifting[which];
         (drifting.knots.step_s, project(&[], std::slice::from_ref(drifting), x))
     }
 
-    /// C b: the change of the samples by a drift with these values at its knots.
+    /// Returns C b: the change of the samples by the drift with the index `which` if it has the
+    /// values `knots` at its knots.
     pub(super) fn course(&self, which: usize, knots: &[f64]) -> Vec<f64> {
         let each = self.drifting[which].each();
         each.map(|(_, k, this, next)| this * knots[k] + next * knots[k + 1]).collect()
@@ -173,7 +179,7 @@ impl Nuisance {
     }
 }
 
-/// C'x: the knots of what drifts, then the offsets.
+/// Returns C'x: first for the knots of all drifts, then for the offsets.
 fn project(offsets: &[Patch], drifting: &[Drifting], x: &[f64]) -> Vec<f64> {
     let mut out = Vec::new();
     for drifting in drifting {
@@ -188,7 +194,8 @@ fn project(offsets: &[Patch], drifting: &[Drifting], x: &[f64]) -> Vec<f64> {
     out
 }
 
-/// Posterior precision C'C + P. Two drifts of one stage are taken as orthogonal.
+/// Returns the posterior precision C'C + P. The columns of different drifts of one stage are
+/// assumed to be orthogonal.
 fn precision(offsets: &[Patch], drifting: &[Drifting]) -> Arrow {
     let knots = drifting.iter().map(|w| w.knots.count).sum();
     let mut a = Arrow::zeros(knots, offsets.len());
@@ -210,16 +217,17 @@ fn precision(offsets: &[Patch], drifting: &[Drifting]) -> Arrow {
     }
     let mut base = 0;
     for drifting in drifting {
-        // A sample lies between two knots: C'C is tridiagonal there.
+        // Each sample lies between two knots, so the part of C'C that belongs to a drift is
+        // tridiagonal.
         for (_, k, x, y) in drifting.each() {
             let k = base + k;
             a.diagonal[k] += x * x;
             a.beside[k] += x * y;
             a.diagonal[k + 1] += y * y;
         }
-        // Inverse covariance of an Ornstein-Uhlenbeck process at even knots, of correlation rho
-        // between neighbours: (1, 1 + rho^2, ..., 1)/(1 - rho^2) on the diagonal, -rho/(1 - rho^2)
-        // on the two secondary diagonals.
+        // P is the inverse covariance of an Ornstein-Uhlenbeck process at evenly spaced knots with
+        // the correlation rho between neighbours. It has (1, 1 + rho^2, ..., 1)/(1 - rho^2) on the
+        // diagonal and -rho/(1 - rho^2) on the two secondary diagonals.
         let (knots, kept) = (drifting.knots.count, drifting.kept);
         let scale = 1.0 / (1.0 - kept * kept);
         for k in 0..knots {
@@ -255,7 +263,7 @@ mod tests {
         )
     }
 
-    /// x'V^-1 y = x'(y - C b) with the most likely b: two ways to the same product.
+    /// x'V^-1 y = x'(y - C b) with the most likely b: both sides are computed.
     #[test]
     fn the_product_is_that_with_a_cleaned_column() {
         let mut random = RandomGenerator::new(2, 0);
@@ -272,8 +280,8 @@ mod tests {
         );
     }
 
-    /// Two equal offsets at the same samples have twice the variance of one; at other samples they
-    /// are independent.
+    /// Two equal offsets at the same samples have together twice the variance of one. Offsets at
+    /// different samples are independent.
     #[test]
     fn offsets_share_what_they_explain() {
         let mut random = RandomGenerator::new(5, 0);
@@ -292,15 +300,15 @@ mod tests {
         );
     }
 
-    /// A single offset against the closed form: V = I + cc', so 1'V^-1 1 = n - (n/2)^2/(1 + n/4) at
-    /// c = 1/2.
+    /// Compares a single offset with the closed form: V = I + cc', so 1'V^-1 1 = n - (n/2)^2/(1 +
+    /// n/4) if all elements of c are 1/2.
     #[test]
     fn an_offset_is_taken_out_as_far_as_its_prior_says() {
         let nuisance = Nuisance::new(vec![patch(0, SAMPLES)], Vec::new());
         let (ones, n) = (vec![1.0; SAMPLES], SAMPLES as f64);
         let tail = nuisance.tail(&ones);
         let expected = n - (0.5 * n).powi(2) / (1.0 + 0.25 * n);
-        // A difference of numbers as large as n.
+        // The tolerance is for a difference of numbers as large as n.
         approx::assert_abs_diff_eq!(n - dot(&tail, &tail), expected, epsilon = FIT_WELL * n);
         let ln_determinant = (1.0 + 0.25 * n).ln();
         approx::assert_abs_diff_eq!(

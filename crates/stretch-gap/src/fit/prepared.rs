@@ -1,14 +1,14 @@
-//! The prepared problem: a simulator and its measurements, re-tuned, with everything that scores
-//! hypotheses.
+//! The prepared problem: a simulator and its measurements, re-tuned, with all quantities that are
+//! needed to score hypotheses.
 //!
 //! Preparation runs once. Each step needs the previous ones:
 //!
 //! 1. the roles of the samples; noise and metrics around the parameters as shipped;
 //! 2. a first re-tuning: maximum a posteriori within the tolerances;
-//! 3. noise and metrics around its result, because sensitivities have changed; a second re-tuning
-//!    in these metrics;
-//! 4. the effective sample size of every stage and the transmitted noise, both at the re-tuned
-//!    nominal simulator, so that they are the same for every hypothesis.
+//! 3. noise and metrics around the result of the first re-tuning, because sensitivities have
+//!    changed; a second re-tuning in these metrics;
+//! 4. the effective sample size and the transmitted noise of every stage, both at the re-tuned
+//!    nominal simulator, so that all hypotheses are compared with the same values.
 //!
 //! A [`PreparedProblem`] is complete: nothing in it is set later.
 
@@ -37,11 +37,11 @@ use crate::{
     },
 };
 
-/// Largest root mean square change, in multiples of the noise, when the step of integration is
-/// halved: a tenth is a hundredth of the noise's variance.
+/// Largest root mean square change of an output when the step of integration is halved, in
+/// multiples of the noise. The square of 0.1 is a hundredth of the noise's variance.
 const SOLVED: f64 = 0.1;
 
-/// Steps of integration that are tried first, as a multiple of the simulator's own.
+/// Step of integration that is tried first, as a multiple of the simulator's usual step.
 const LONGER: f64 = 2.0;
 
 /// Everything that a search needs.
@@ -50,32 +50,31 @@ pub(crate) struct PreparedProblem<'a> {
     pub(crate) compare: Comparison<'a>,
     /// Parameters as shipped.
     pub(crate) shipped: Model,
-    /// Re-tuned, without effects.
+    /// The re-tuned nominal simulator, i.e. without effects.
     pub(crate) nominal: Hypothesis,
     /// Information of the re-tuning about the nominal parameters.
     information: Vec<Information>,
     /// By stage: sensitivities of its nominal parameters around the re-tuned nominal simulator.
     pub(crate) sensitivities: Vec<Sensitivities>,
-    /// By stage: samples that count as one observation.
+    /// By stage: number of samples that count as one observation.
     memory: Vec<f64>,
-    /// By stage: effective numbers of its samples.
+    /// By stage: effective sample sizes.
     observations: Vec<Observations>,
     /// By stage: noise that the re-tuned nominal simulator transmits.
     transmitted: Vec<Misfit>,
     /// Number of starts of re-tuning, and how many of them ended at the result.
     pub(crate) starts: Starts,
-    /// Whether the re-tuned parameters could not be simulated over all trials, so that others
-    /// replace them.
+    /// Whether the re-tuned parameters could not be simulated over all trials, so that earlier
+    /// parameters were kept.
     pub(crate) is_held: bool,
 }
 
 impl<'a> PreparedProblem<'a> {
     /// Determines sample roles, noise, metrics, re-tuning, sample sizes and transmitted noise.
     ///
-    /// # Errors
-    /// [`GapError::Solver`] if the step of integration is visible, [`GapError::TooLittle`] without
-    /// anything to fit, [`GapError::Measured`] if measurements are missing, and errors of the
-    /// simulator.
+    /// # Errors [`GapError::Solver`] if the step of integration is so long that its error is
+    /// visible, [`GapError::TooLittle`] if there is nothing to fit, [`GapError::Measured`] if
+    /// measurements are missing, and errors of the simulator.
     pub(crate) fn prepare(
         simulator: &'a dyn Simulator,
         stop: &'a (dyn Fn() -> bool + Sync),
@@ -83,11 +82,12 @@ impl<'a> PreparedProblem<'a> {
         progress: &dyn Fn(&str),
     ) -> Result<Self, GapError> {
         let runs = Runs::new(simulator, stop)?;
-        // Every result is compared with the simulator as shipped over all trials, so this must be
-        // possible.
+        // Every result is compared with the simulator as shipped, so it must be possible to
+        // simulate it over all trials.
         runs.try_all(&Model::nominal(simulator))?;
-        // Try twice the step, if the change from halving it stays within the limit. Not for counted
-        // runs, because these may be an external program's.
+        // To save time, try twice the usual step; it is used if halving it changes the outputs by
+        // no more than [`SOLVED`]. Do not try this if runs are counted, because they may be runs of
+        // an external program.
         if simulator.model_runs().is_none() {
             match Self::at(runs.at_step(LONGER), seed, progress) {
                 Err(GapError::Solver { .. }) => {}
@@ -123,12 +123,12 @@ impl<'a> PreparedProblem<'a> {
         Ok(Some(other.with_starts(self.starts)))
     }
 
-    /// The same, with the number of re-tuning starts.
+    /// The same problem with these results of re-tuning from several starts.
     pub(super) fn with_starts(self, starts: Starts) -> Self {
         Self { starts, ..self }
     }
 
-    /// Re-tuned in given metrics.
+    /// Re-tunes the simulator in the metrics of `compare`.
     pub(super) fn of(
         compare: Comparison<'a>,
         shipped: Model,
@@ -200,7 +200,8 @@ impl<'a> PreparedProblem<'a> {
         self.compare.runs.stop()
     }
 
-    /// Whether the simulator's budget allows only the runs that the answer itself needs.
+    /// Whether so much of the simulator's budget of runs is spent that only the runs that the
+    /// answer itself needs are allowed.
     pub(crate) fn is_spent(&self) -> bool {
         self.compare.runs.is_spent()
     }
@@ -210,7 +211,8 @@ impl<'a> PreparedProblem<'a> {
         identified(self.simulator().parameters(), &self.nominal.model, &self.information)
     }
 
-    /// [`Comparison::fit`], with misfits at equal transmitted noise.
+    /// Fits like [`Comparison::fit`], and corrects the misfits to
+    /// [equal transmitted noise](Misfit::at_equal_noise).
     pub(crate) fn fit(
         &self,
         stages: &[usize],
@@ -234,8 +236,8 @@ impl<'a> PreparedProblem<'a> {
         Ok(fitted)
     }
 
-    /// What a model leaves of an output with the effects that read other outputs, and without;
-    /// `None` if no effect of the catalogue reads it.
+    /// Returns the residual of an output with and without the model's effects that read other
+    /// outputs. `None` if no effect of the catalogue makes this output read another or reads it.
     fn read(&self, misfit: &Misfit, model: &Model) -> Result<Option<Read>, GapError> {
         let (stage, compare) = (misfit.stage, &self.compare);
         let effects = self.simulator().effects();
@@ -259,8 +261,9 @@ impl<'a> PreparedProblem<'a> {
         Ok(Some(Read { left: compare.errors(stage, &left), unread }))
     }
 
-    /// Score of a hypothesis's misfits and model against the re-tuned nominal simulator, nats. What
-    /// effects explain by errors that outputs [share](crate::fit::alike) does not count.
+    /// Returns the score of a hypothesis, given its misfits and model, relative to the re-tuned
+    /// nominal simulator, nats. If an effect explains an error only by an error that outputs
+    /// [have in common](crate::fit::alike), this does not count.
     pub(crate) fn score(&self, misfits: &[Misfit], model: &Model) -> f64 {
         let simulator = self.simulator();
         let free = free_parameters(simulator, model);
@@ -271,8 +274,8 @@ impl<'a> PreparedProblem<'a> {
             - choice_cost(simulator, model)
     }
 
-    /// Penalty of a model's effects, nats: (k/2) ln(blocks) for k free parameters, and the costs of
-    /// their forms and choices.
+    /// Returns the penalty of a model's effects, nats: (k/2) ln(blocks) for k free parameters, plus
+    /// the costs of the effects' forms and of the ways in which they act.
     pub(crate) fn price(&self, model: &Model) -> f64 {
         let simulator = self.simulator();
         let free = free_parameters(simulator, model) as f64;
@@ -281,7 +284,7 @@ impl<'a> PreparedProblem<'a> {
             + choice_cost(simulator, model)
     }
 
-    /// Log-likelihood ratio of two lists of misfits, nats, without penalties.
+    /// Returns the log-likelihood ratio of two lists of misfits, nats, without penalties.
     pub(crate) fn ratio(&self, base: &[Misfit], misfits: &[Misfit]) -> f64 {
         score(base, misfits, &self.observations, 0, 1.0)
     }
@@ -292,14 +295,15 @@ impl<'a> PreparedProblem<'a> {
         all.filter(|(_, m)| !m.loose().is_empty()).map(|(stage, _)| stage)
     }
 
-    /// Whether an effect acts in a stage with such loose parameters. Nuisances may then explain the
-    /// same as the effect.
+    /// Whether an effect acts in a stage with parameters that drift or have an offset in each
+    /// trial. Nuisances may then explain the same as the effect.
     pub(crate) fn is_in_loose_stage(&self, effect: usize) -> bool {
         let touches = &self.simulator().effects()[effect].touches;
         self.loose_stages().any(|stage| touches.contains(&stage))
     }
 
-    /// Smallest spectral level of a hypothesis's residual in each stage with loose parameters.
+    /// Returns the spectral level (see `Metric::spectral_level`) of a hypothesis's residual in each
+    /// stage with loose parameters (those that drift or have an offset in each trial).
     pub(crate) fn levels(&self, hypothesis: &Hypothesis) -> Result<Vec<f64>, GapError> {
         let one = |stage| {
             let residual = self.compare.residual_values(stage, &hypothesis.model)?;
@@ -308,9 +312,9 @@ impl<'a> PreparedProblem<'a> {
         self.loose_stages().map(one).collect()
     }
 
-    /// Log-likelihood of a hypothesis in the stages with loose parameters, nats. Their nuisances
-    /// are marginalised, the sizes of these integrated over, and the penalty of the effects is
-    /// subtracted; `levels` as of [`PreparedProblem::levels`].
+    /// Returns the log-likelihood of a hypothesis in the stages with loose parameters, nats. The
+    /// nuisances are marginalised, and the likelihood is integrated over their sizes. The penalty
+    /// of the effects is subtracted. `levels` are those of [`PreparedProblem::levels`].
     pub(crate) fn likelihood(
         &self,
         hypothesis: &Hypothesis,
@@ -327,16 +331,16 @@ impl<'a> PreparedProblem<'a> {
         Ok(sum)
     }
 
-    /// Log-likelihood of a hypothesis, nats: of the records themselves, so that two problems of the
-    /// same records can be compared.
+    /// Returns the log-likelihood of a hypothesis, nats. It is not relative to the nominal
+    /// simulator, so that two prepared problems with the same recordings can be compared.
     ///
     /// ```text
     /// l = -(1/block) sum over stages [ (N/2) ln max(X, 1) + (1/2) ln det V + sum ln s_i ] - penalties
     /// ```
     ///
     /// with noise s_i, the metric V and the reduced chi-square X over fitted and held-out samples.
-    /// A model may leave more than its noise, but noise that is predicted too large does not
-    /// improve it. A block is one observation, whatever the residual's memory is.
+    /// X below 1, i.e. noise that was assumed too large, does not raise l. A block counts as one
+    /// observation, whatever the correlation time of the residual is.
     pub(crate) fn log_likelihood(&self, hypothesis: &Hypothesis) -> f64 {
         let (compare, roles) = (&self.compare, &self.compare.roles);
         let mut sum = 0.0;
@@ -350,15 +354,16 @@ impl<'a> PreparedProblem<'a> {
         -compare.weight() * sum - 0.5 * free * roles.blocks(Role::Fit).ln()
     }
 
-    /// Rise of the log-likelihood from one hypothesis to another by the
-    /// [octaves](crate::fit::octaves) of their residuals, nats, beyond the share `of_closed` of
-    /// what the first closes in each octave.
+    /// Returns the rise of the log-likelihood from the hypothesis `base` to `next`, nats, computed
+    /// from the [octaves](crate::fit::octaves) of their residuals. In each octave, the share
+    /// `of_closed` of what `base` closes counts as model discrepancy and does not contribute.
     pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis, of_closed: f64) -> f64 {
         let stages = 0..base.misfits.len();
         stages.map(|s| self.rise_in(base, s, &next.misfits[s].octaves, of_closed)).sum()
     }
 
-    /// The same in one stage if only noise were left of it.
+    /// Returns the rise that [`PreparedProblem::rise`] would have in one stage if only noise were
+    /// left in this stage.
     pub(crate) fn most_rise(&self, base: &Hypothesis, stage: usize, of_closed: f64) -> f64 {
         self.rise_in(base, stage, &base.misfits[stage].octaves.of_noise(), of_closed)
     }
@@ -368,35 +373,37 @@ impl<'a> PreparedProblem<'a> {
         base.misfits[stage].octaves.less_discrepancy(nominal, next, of_closed).rise(next)
     }
 
-    /// Reduction of a fit's cost that corresponds to a gap, nats: a block of the fitted samples
-    /// counts as one.
+    /// Returns the reduction of a fit's cost that corresponds to closing a gap, nats. A block of
+    /// the fitted samples counts as one observation.
     pub(crate) fn gain_of(&self, gap: f64) -> f64 {
         0.5 * self.compare.roles.blocks(Role::Fit) * gap
     }
 
-    /// Share of a stage's noise that comes from noise of its measured input.
+    /// Returns the share of the variance of a stage's noise that comes from the noise of its
+    /// measured input.
     pub(crate) fn transmits(&self, stage: usize) -> f64 {
         self.transmitted[stage].fit
     }
 
-    /// Excess of one stage over fitted and held-out samples together.
+    /// Returns the gap in one stage, over fitted and held-out samples together.
     pub(crate) fn gap_in(&self, hypothesis: &Hypothesis, stage: usize) -> f64 {
         gap(self.compare.mean_square(&hypothesis.misfits[stage]))
     }
 
     /// Returns how much of one stage's gap under `base` is closed by `next`. The noise is known
-    /// only to a few per cent, so a reduction below the noise counts as well.
+    /// only to a few per cent, so a reduction below the assumed noise counts as well.
     pub(crate) fn closes(&self, base: &Hypothesis, next: &Hypothesis, stage: usize) -> f64 {
         let mean_square = |h: &Hypothesis| self.compare.mean_square(&h.misfits[stage]);
         mean_square(base) - mean_square(next)
     }
 
-    /// The gap that a hypothesis leaves, summed over stages.
+    /// Returns the gap that a hypothesis leaves, summed over stages.
     pub(crate) fn gap(&self, hypothesis: &Hypothesis) -> f64 {
         (0..hypothesis.misfits.len()).map(|stage| self.gap_in(hypothesis, stage)).sum()
     }
 
-    /// Smallest number of samples per observation of all stages, as a share of a block.
+    /// Returns the number of samples that count as one observation in the stage in which it is
+    /// smallest, as a share of a block.
     pub(crate) fn finest(&self) -> f64 {
         let memory = self.memory.iter().copied().fold(f64::INFINITY, f64::min);
         (memory / self.compare.roles.block as f64).min(1.0)
@@ -411,8 +418,8 @@ pub(super) fn linearise(compare: &Comparison<'_>, model: &Model) -> Result<(), G
 }
 
 /// Returns every stage [re-tuned](retuned). If the result cannot be simulated over all trials, the
-/// parameters of the start, or else those as shipped, are kept. The last value is true in this
-/// case.
+/// parameters of the start are kept, or those as shipped if the start cannot be simulated either.
+/// The last value tells whether this happened.
 fn possible_retuning(
     compare: &Comparison<'_>,
     start: &Model,
@@ -427,8 +434,8 @@ fn possible_retuning(
     Ok((nominal, information, true))
 }
 
-/// Re-tunes every stage separately, but stages that share a parameter together. Without effects,
-/// stages without a common parameter are independent.
+/// Re-tunes stages that have a common parameter together, and all other stages separately: without
+/// effects, stages without a common parameter are independent.
 fn retuned(
     compare: &Comparison<'_>,
     start: &Model,
@@ -457,8 +464,8 @@ fn retuned(
     Ok((all, information))
 }
 
-/// Refuses a simulator whose step of integration is visible, because its error would be named as an
-/// effect.
+/// Returns an error if the step of integration is so long that its error is visible, because this
+/// error would be taken for an effect.
 fn solver_check(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
     for (stage, metric) in compare.metrics.iter().enumerate() {
         let run = Run::exact(stage, model, compare.roles.fit_trials);

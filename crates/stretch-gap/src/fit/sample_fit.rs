@@ -1,17 +1,18 @@
-//! Fits selected samples of a session by themselves, and determines how well these samples alone
-//! determine every value.
+//! Fits a simulator to selected samples of a session, and determines how well these samples alone
+//! determine every fitted value.
 //!
-//! The fit is that of [`levenberg_marquardt`](crate::fit::levenberg_marquardt), with every sample
-//! as an observation. Remaining errors are correlated and count as fewer observations, so the
-//! information of the data is divided by
+//! The fit is that of [`levenberg_marquardt`](crate::fit::levenberg_marquardt), except that every
+//! sample counts as one observation. Because the residual r is correlated and may exceed the noise,
+//! the information of the data is divided by
 //!
 //! ```text
 //! max(1, X tau),     X = mean r^2,     tau = 1 + 2 sum of the autocorrelations of r while pairs of them are positive
 //! ```
 //!
-//! of the stage in which this is largest (Geyer's initial positive sequence). In the covariance,
-//! the prior of every value is as wide as its tolerance. For a parameter of an effect, this is the
-//! value itself, because the effect may be absent.
+//! in the stage in which this number is largest. The sum ends where the sum of two successive
+//! autocorrelations is no longer positive (Geyer's initial positive sequence). For the standard
+//! deviations of the result, the prior of every value is as wide as its tolerance. The tolerance of
+//! an effect's parameter is the value itself, because the effect may be absent.
 
 use nalgebra::DMatrix;
 use serde::Serialize;
@@ -39,38 +40,41 @@ use crate::{
 const ROUNDS: usize = 4;
 /// Fall of the cost, nats, below which a further descent is not worth its runs.
 const LEAST_FALL: f64 = 0.03;
-/// Standard deviations to either side that hold 95 % of a Gaussian.
+/// Number of standard deviations on either side of the mean within which 95 % of a Gaussian lie.
 const COVERS: f64 = 1.96;
-/// Variance of a value, in squares of its tolerance, up to which an estimate of it is reported.
+/// Largest variance of a value for which an estimate is reported, relative to the square of its
+/// tolerance.
 const TELLING: f64 = 0.5;
 
-/// A fit of some samples.
+/// Result of a fit to selected samples.
 #[derive(Debug, Clone)]
 pub struct SampleFit {
-    /// Nominal parameters, and parameters of the effects.
+    /// Fitted nominal parameters and parameters of the effects.
     pub model: Model,
     /// Root mean square error in multiples of the noise.
     pub times_noise: f64,
-    /// The same for the model at which the fit began.
+    /// Root mean square error in multiples of the noise, for the model at which the fit began.
     pub times_noise_of_start: f64,
     /// Every value that was fitted: nominal parameters stage by stage, then the parameters of the
     /// effects without their forms.
     pub values: Vec<SampleValue>,
 }
 
-/// A value that was fitted to some samples, with its 95 % interval, and how well the samples
+/// A value that was fitted to selected samples, with its 95 % interval, and how well the samples
 /// determine it.
 #[derive(Debug, Clone, Serialize)]
 pub struct SampleValue {
-    /// How well the samples determine the value; its name is that of a parameter, or `effect.parameter`.
+    /// How well the samples determine the value. The name in it is that of a nominal parameter, or
+    /// `effect.parameter`.
     #[serde(flatten)]
     pub identified: Identified,
     /// The value.
     pub value: f64,
     /// 95 % interval, within the range that was searched.
     pub interval: [f64; 2],
-    /// Estimate from these samples alone, without the prior, on the scale of [`SampleValue::at`]:
-    /// the mode and its variance. `None` if the samples determine the value poorly.
+    /// Estimate from these samples alone, without the prior: the mode and its variance, on the
+    /// scale of the fit (see [`SampleValue::at`]). `None` if the samples determine the value
+    /// poorly.
     #[serde(skip)]
     pub estimate: Option<(f64, f64)>,
     #[serde(skip)]
@@ -80,7 +84,7 @@ pub struct SampleValue {
 }
 
 impl SampleValue {
-    /// Converts a place on the scale of the fit to the value there, limited to the range that is
+    /// Converts a coordinate on the scale of the fit to the value, limited to the range that is
     /// searched.
     pub fn at(&self, place: f64) -> f64 {
         self.coordinate.value(place.clamp(self.bounds[0], self.bounds[1]))
@@ -88,14 +92,14 @@ impl SampleValue {
 }
 
 /// Fits nominal parameters, within their tolerances, and the parameters of a model's effects to
-/// some samples. The forms of the effects stay as they are.
+/// selected samples. The forms of the effects (shape parameters such as the width of a knee) stay
+/// as they are.
 ///
-/// `samples` are indices into all trials concatenated, in ascending order; `noise` is one standard
-/// deviation by stage.
+/// `samples` holds indices into the concatenated trials, in ascending order. `noise` holds one
+/// standard deviation of the noise by stage.
 ///
-/// # Errors
-/// Errors of the simulator, a measured channel that is shorter than the trials or not finite, and a
-/// budget that is spent before the fit ends.
+/// # Errors Errors of the simulator; an error if a measured channel is shorter than the trials or
+/// not finite; an error if the budget of runs is spent before the fit ends.
 pub fn fit_samples(
     simulator: &dyn Simulator,
     noise: &[f64],
@@ -187,7 +191,8 @@ fn values(
     let value = |(i, identified): (usize, Identified)| {
         let (coordinate, bounds) = coordinates[i];
         let (x, v) = (coordinate.read(model), covariance[(i, i)]);
-        // The posterior of a prior of variance 1 has 1/v = 1/v_data + 1; the mode lies where the slopes of data and prior cancel.
+        // With a prior of variance 1, the posterior variance v is given by 1/v = 1/v_data + 1. The
+        // mode of the posterior is where the slopes of data and prior cancel.
         let estimate = (v > 0.0 && v < TELLING).then(|| {
             let own = tolerances[i] * tolerances[i] / (1.0 / v - 1.0);
             (x + priors[i].slope * own / inflation, own)
@@ -207,7 +212,7 @@ fn values(
     all.into_iter().enumerate().map(value).collect()
 }
 
-/// Returns roles that fit these samples and no others, each of them as an observation.
+/// Returns sample roles with which only these samples are fitted, each as one observation.
 fn fitted(trials: &[TrialSpec], samples: &[usize]) -> SampleRoles {
     let mut segments: Vec<Segment> = Vec::new();
     let (mut trial, mut end) = (0, trials.first().map_or(0, |t| t.samples));
@@ -224,8 +229,8 @@ fn fitted(trials: &[TrialSpec], samples: &[usize]) -> SampleRoles {
     SampleRoles { segments, block: 1, fit_trials: trial + 1, borrowed_test: false }
 }
 
-/// Returns the tolerance of a coordinate before any data, in its own unit. `found` is its value
-/// after the diagnosis.
+/// Returns the standard deviation of a coordinate's prior, in the unit of the coordinate. `found`
+/// is the coordinate after the diagnosis.
 fn tolerance(coordinate: Coordinate, found: f64) -> f64 {
     match coordinate {
         Coordinate::Linear { .. } if found == 0.0 => 0.5,
@@ -234,7 +239,7 @@ fn tolerance(coordinate: Coordinate, found: f64) -> f64 {
     }
 }
 
-/// A coordinate as a parameter with a tolerance.
+/// Returns a coordinate as the specification of a parameter with a tolerance.
 fn spec(
     simulator: &dyn Simulator,
     coordinate: Coordinate,
@@ -251,7 +256,7 @@ fn spec(
     let effect = &simulator.effects()[*effect];
     let (own, value) = (&effect.parameters[index], values[index]);
     let name = format!("{}.{}", effect.name, own.name);
-    // No bounds: an effect may be as large as its range allows.
+    // The specification has no bounds: an effect may be as large as its range allows.
     ParameterSpec::new(&name, &own.unit, value).within(tolerance * coordinate.slope(value))
 }
 
@@ -259,8 +264,8 @@ fn mean_square(residual: &[f64]) -> f64 {
     residual.iter().map(|r| r * r).sum::<f64>() / residual.len().max(1) as f64
 }
 
-/// Returns 1 + 2 sum of the autocorrelations, until a pair of them is not above what chance makes,
-/// or up to a quarter of the samples.
+/// Returns 1 + 2 sum of the autocorrelations. The sum ends where two successive autocorrelations
+/// together are not above what occurs by chance, or at a lag of a quarter of the samples.
 fn correlation_time(r: &[f64]) -> f64 {
     let mean = r.iter().sum::<f64>() / r.len().max(1) as f64;
     let at =
@@ -273,7 +278,7 @@ fn correlation_time(r: &[f64]) -> f64 {
     let mut lag = 1;
     while lag + 1 < r.len() / 4 {
         let pair = (at(lag) + at(lag + 1)) / variance;
-        // White noise reaches this by chance.
+        // In white noise, pairs reach this value by chance.
         if pair <= 2.0 / (r.len() as f64).sqrt() {
             break;
         }

@@ -1,18 +1,20 @@
 //! Repeats re-tuning from several points within the tolerances, so that a local minimum is not
-//! taken for the best that parameters can do.
+//! taken for the best fit by parameters.
 //!
 //! A descent ends in the nearest minimum of the cost J of [a fit](crate::fit::levenberg_marquardt).
-//! A rig that oscillates or rotates has many: a phase error of half a turn costs no less than one
-//! of a whole turn. If re-tuning leaves a gap that counts, further points are tried:
+//! For a rig that oscillates or rotates, J has many minima: a phase error of half a turn does not
+//! cost less than one of a whole turn. If re-tuning leaves a gap that counts, further points are
+//! tried:
 //!
-//! 1. the costs at the parameters as shipped and at [`POINTS`] points of a Latin hypercube within
-//!    [`SPREAD`] tolerances (McKay, Beckman and Conover 1979, doi 10.1080/00401706.1979.10489755),
-//!    in one batch;
-//! 2. a descent from each of the best points whose cost is near that of the re-tuning, if any;
-//! 3. a descent over growing parts of the trials, from the point that fits their beginnings best:
-//!    see `StartSearch::grown`.
+//! 1. compute, in one batch, the costs at the parameters as shipped and at [`POINTS`] points of a
+//!    Latin hypercube within [`SPREAD`] tolerances (McKay, Beckman and Conover 1979, doi
+//!    10.1080/00401706.1979.10489755);
+//! 2. descend from each of the best points whose cost is near that of the re-tuning, if there are
+//!    any;
+//! 3. descend over growing parts of the trials, from the point that fits the beginnings of the
+//!    trials best: see `StartSearch::grown`.
 //!
-//! A descent that ends [`LEARNT`] nats lower replaces the re-tuning.
+//! If a descent ends at a cost that is lower by [`LEARNT`] nats, its result replaces the re-tuning.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -33,19 +35,20 @@ use crate::{
 
 /// Number of points whose cost is computed.
 const POINTS: usize = 10;
-/// Tolerances within which the points lie.
+/// Largest distance of the points from the nominal parameters, in tolerances.
 const SPREAD: f64 = 2.0;
 /// Largest number of points from which a descent begins, the best first.
 const DESCENTS: usize = 3;
-/// Multiple of the re-tuning's cost up to which the cost at a point is near it.
+/// The cost at a point is near that of the re-tuning if it is at most this multiple of it.
 const NEAR: f64 = 2.0;
 /// Largest number of successive descents, each with new sensitivities.
 const ROUNDS: usize = 4;
-/// Growing parts of the trials to which a descent is limited.
+/// Growing parts of the trials, to which the descents are limited one after the other.
 const PARTS: [f64; 4] = [0.1, 0.2, 0.4, 0.7];
-/// Share of the gap of the re-tuning that such a descent may leave on a part.
+/// Share of the re-tuning's gap that a descent over a part may leave there.
 const LEFT: f64 = 0.1;
-/// Relative difference in cost within which two descents count as the same end.
+/// Largest relative difference in cost for which two descents are considered to end at the same
+/// point.
 const ALIKE: f64 = 0.01;
 
 /// Number of starts of re-tuning, and how many of them ended at the best result.
@@ -79,7 +82,7 @@ impl Starts {
         })
     }
 
-    /// Returns the starts of the one of two groups of stages whose starts disagree most.
+    /// Of the results for two groups of stages, returns the one whose starts disagree more.
     fn beside(self, other: Self) -> Self {
         let misses = |s: &Self| (s.tried - s.agreed, s.tried);
         if misses(&other) > misses(&self) { other } else { self }
@@ -99,8 +102,9 @@ impl PreparedProblem<'_> {
         })
     }
 
-    /// Returns the problem re-tuned from the parameters of a set, if that ends lower: what the
-    /// parameters explain without the effects of the set is not evidence for these effects.
+    /// Returns the problem re-tuned without effects, starting from the parameters of a set of
+    /// effects, if this ends at a lower cost. The reason is that what the parameters can explain
+    /// without the effects is no evidence for these effects.
     pub(crate) fn retuned_from(
         &self,
         set: &Hypothesis,
@@ -131,7 +135,8 @@ impl PreparedProblem<'_> {
         Ok(found)
     }
 
-    /// The same problem around a model.
+    /// Returns the same problem with noise and metrics computed around a model, and re-tuned from
+    /// it.
     fn at_model(&self, model: &Model, seed: u64) -> Result<Self, GapError> {
         let (runs, roles) = (self.compare.runs.clone(), self.compare.roles.clone());
         let like = Some(self.compare.metrics.as_slice());
@@ -142,16 +147,17 @@ impl PreparedProblem<'_> {
 
 /// Where a further re-tuning may begin.
 enum Places<'m> {
-    /// Anywhere within the tolerances, drawn from a seed.
+    /// At random points within the tolerances, drawn with this seed.
     Tolerances(u64),
     /// At the parameters of a model.
     At(&'m Model),
 }
 
-/// Returns a model whose re-tuned parameters leave less than those of `nominal`, `None` if there is
-/// none, and how the starts agreed.
+/// Returns a re-tuned model that leaves less than `nominal`, or `None` if there is none, and how
+/// many starts agreed.
 ///
-/// Groups without a stage whose gap counts, according to `counts`, are left as they are.
+/// `counts` tells whether the gap of a stage counts. Groups of stages without such a gap are not
+/// re-tuned again.
 fn better_start(
     compare: &Comparison<'_>,
     nominal: &Model,
@@ -172,7 +178,8 @@ fn better_start(
     Ok(((best != *nominal).then_some(best), starts))
 }
 
-/// Stages that are re-tuned together, and the model at which their re-tuning ended.
+/// Search from several starts, for a group of stages that are re-tuned together. `nominal` is the
+/// model at which their re-tuning ended.
 struct StartSearch<'a, 'b> {
     compare: &'a Comparison<'b>,
     group: &'a [usize],
@@ -180,8 +187,8 @@ struct StartSearch<'a, 'b> {
 }
 
 impl StartSearch<'_, '_> {
-    /// Returns the model of the lowest descent, if it ends lower than the re-tuning, and how many
-    /// descents ended there.
+    /// Returns the model at the end of the lowest descent, if this is lower than the re-tuning, and
+    /// how many descents ended there.
     fn best_end(&self, places: &Places<'_>) -> Result<(Option<Model>, Starts), GapError> {
         let mut models = vec![self.nominal.clone()];
         match places {
@@ -214,9 +221,9 @@ impl StartSearch<'_, '_> {
         Ok((lowest.filter(|end| found - end.cost > LEARNT).map(|end| end.model), starts))
     }
 
-    /// Returns points of a Latin hypercube, and the parameters as shipped. In the hypercube, the
-    /// range of every parameter is divided into as many equal parts as there are points, and each
-    /// part holds one point.
+    /// Returns the points of a Latin hypercube, and the parameters as shipped. In a Latin
+    /// hypercube, the range of every parameter is divided into as many equal parts as there are
+    /// points, and each part contains one point.
     fn hypercube(&self, seed: u64) -> Vec<Model> {
         let free = coordinates(self.compare.simulator(), self.group, self.nominal);
         let mut random = RandomGenerator::new(seed, 71);
@@ -234,8 +241,8 @@ impl StartSearch<'_, '_> {
         models
     }
 
-    /// Computes the costs of some models over the whole and over the beginning of the trials, in
-    /// one batch; `None` for a model that cannot be simulated.
+    /// Computes two costs of each model in one batch: over the whole trials and over their
+    /// beginnings. `None` for a model that cannot be simulated.
     fn costs(
         &self,
         models: &[Model],
@@ -278,10 +285,10 @@ impl StartSearch<'_, '_> {
         Ok(best)
     }
 
-    /// Descends over growing parts of the trials. At the beginning of a trial phases are nearly
-    /// right, and each longer part continues from the end of the previous one. `None` if a part
-    /// keeps more than `LEFT` of the re-tuning's gap: a beginning that no parameters explain is
-    /// not explained in the whole.
+    /// Descends over growing parts of the trials: at the beginning of a trial, the phases of
+    /// oscillations are still nearly right. Each descent continues from the result of the previous,
+    /// shorter part. Returns `None` if more than `LEFT` of the re-tuning's gap remains on a part:
+    /// if no parameters explain the beginning, none explain the whole.
     fn grown(&self, mut model: Model) -> Result<Option<Fitted>, GapError> {
         let gap_of = |misfits: &[Misfit]| misfits.iter().map(|m| gap(m.fit)).sum::<f64>();
         let stages = self.group.iter().map(|stage| self.compare.residual(*stage, self.nominal));

@@ -1,10 +1,11 @@
-//! Decides whether a drifting parameter swings, i.e. oscillates: compares a drift with a spectral
-//! line with the drift alone.
+//! Decides whether a drifting parameter swings, i.e. oscillates. Two hypotheses are compared: a
+//! drift plus a spectral line (an oscillation with one frequency), and the drift alone.
 //!
-//! A drift that is adapted to the recording absorbs a swing of its parameter as a fast drift, so
-//! that no gap is left. [Cleaning](crate::fit::metric::Metric::clean) turns a residual r into V^-1
-//! r, and V contains the adapted drift. In the alternative hypothesis, the parameter swings with
-//! one frequency f and amplitude s, and with a separate phase in each segment k:
+//! Size and correlation time of a drift are adapted to the recording. If a parameter swings, this
+//! drift explains the swing as a fast drift, so that no gap is left. The covariance V of the
+//! residual r contains this drift; [cleaning](crate::fit::metric::Metric::clean) turns r into V^-1
+//! r. With the spectral line, the parameter swings with one frequency f and amplitude s, and with a
+//! separate phase in each segment k. B is the ratio of the two likelihoods (the Bayes factor):
 //!
 //! ```text
 //! a_k cos(2 pi f t) + b_k sin(2 pi f t),     a_k, b_k ~ N(0, s^2/2),     U_k = C (cos, sin) at the knots of the drift
@@ -12,11 +13,12 @@
 //! A_k = U_k' V^-1 U_k,     q_k = U_k' V^-1 r
 //! ```
 //!
-//! V is enlarged if the median |q|^2 around f is larger than V predicts, because the residual of
-//! another form of an effect is not a line (Rasmussen and Williams 2006, section 2.7; without a
-//! drift this is the periodogram of Bretthorst 1988, doi 10.1007/978-1-4684-9399-3). B is averaged
-//! over amplitudes and over all frequencies. Only the strongest peaks are computed; all else counts
-//! as 0, which favours the drift. The prior odds are even.
+//! The equations are those of Rasmussen and Williams (2006, section 2.7). Without a drift, ln B is
+//! the periodogram of Bretthorst (1988, doi 10.1007/978-1-4684-9399-3). If the median of |q|^2
+//! around f is larger than V predicts, V is scaled up, because a wrong form of an effect also
+//! leaves power, but not only at f. B is averaged over amplitudes and over all frequencies. It is
+//! computed only at the strongest peaks and counts as 0 elsewhere, which favours the drift. The
+//! prior odds are even.
 
 use std::f64::consts::TAU;
 
@@ -44,14 +46,17 @@ pub(crate) struct Swing {
 
 /// Amplitudes that are tried, as multiples of the drift's standard deviation.
 const AMPLITUDES: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
-/// Smallest number of knots in a period, and of periods in the longest segment.
+/// A period must contain at least [`KNOTS`] knots of the drift, and the longest segment at least
+/// [`TURNS`] periods.
 const KNOTS: f64 = 4.0;
 const TURNS: f64 = 2.0;
-/// Largest number of frequencies, the slow ones first: enough for all of a segment of five minutes.
+/// Largest number of frequencies that are tried, the low ones first. It suffices for all
+/// frequencies of a segment of five minutes.
 const MOST: usize = 1500;
-/// Number of frequencies on either side from which the usual power is determined.
+/// Number of frequencies on either side of a frequency, from whose power the usual power is
+/// determined.
 const BESIDE: usize = 10;
-/// Number of peaks, those with the most power over the usual one, at which B is computed.
+/// Number of peaks at which B is computed: those whose power exceeds the usual power most.
 const PEAKS: usize = 6;
 
 impl Metric {
@@ -112,7 +117,7 @@ impl Metric {
             for amplitude in AMPLITUDES {
                 let precision = 2.0 / (amplitude * amplitude);
                 let factor: f64 = heard.iter().map(|h| h.ln_factor(precision)).sum();
-                // keeps the odds finite
+                // The limit keeps the odds finite.
                 sum += factor.min(300.0).exp();
                 if best.as_ref().is_none_or(|(most, ..)| factor > *most) {
                     best = Some((factor, hertz, rms_amplitude(&heard, precision)));
@@ -124,14 +129,14 @@ impl Metric {
     }
 }
 
-/// Median power of the frequencies on both sides.
+/// Returns the median power of the neighbouring frequencies.
 fn usual(powers: &[f64], k: usize) -> f64 {
     let mut beside = powers[k.saturating_sub(BESIDE)..(k + BESIDE).min(powers.len())].to_vec();
     beside.sort_by(f64::total_cmp);
     beside[beside.len() / 2].max(f64::MIN_POSITIVE)
 }
 
-/// One segment, projected on one of its drifts.
+/// One segment of the residual, projected on one of its drifts.
 struct Part<'a> {
     nuisance: &'a Nuisance,
     which: usize,
@@ -150,12 +155,12 @@ impl<'a> Part<'a> {
         self.heard.len() as f64 * self.step_s
     }
 
-    /// q of the module's head. `waves` may be longer than the segment.
+    /// Returns q of the module documentation. `waves` may be longer than the segment.
     fn q(&self, waves: &[Vec<f64>; 2]) -> [f64; 2] {
         [0, 1].map(|i| dot(&waves[i][..self.heard.len()], &self.heard))
     }
 
-    /// A and q of the module's head.
+    /// Returns A and q of the module documentation.
     fn line(&self, waves: &[Vec<f64>; 2]) -> Heard {
         let columns = [0, 1].map(|i| self.nuisance.course(self.which, &waves[i]));
         let tails = [0, 1].map(|i| self.nuisance.tail(&columns[i]));
@@ -165,7 +170,8 @@ impl<'a> Part<'a> {
     }
 }
 
-/// Returns cosine and sine at knots `turn` rad apart, by repeated rotation.
+/// Returns cosine and sine at the knots, computed by repeated rotation. The phase grows by `turn`
+/// rad from knot to knot.
 fn waves(turn: f64, knots: usize) -> [Vec<f64>; 2] {
     let (sin, cos) = (libm::sin(turn), libm::cos(turn));
     let turned = |&(c, s): &(f64, f64)| Some((c * cos - s * sin, s * cos + c * sin));
@@ -173,19 +179,21 @@ fn waves(turn: f64, knots: usize) -> [Vec<f64>; 2] {
     [c, s]
 }
 
-/// Statistics of one segment for a line: A (its upper triangle) and q of the module's head.
+/// Statistics of one segment for a spectral line: the upper triangle of A, and q of the module
+/// documentation.
 struct Heard {
     a: [f64; 3],
     q: [f64; 2],
 }
 
 impl Heard {
-    /// Returns the statistics if the noise around the frequency is `times` as large as V predicts.
+    /// Returns the statistics if the power of the noise around the frequency is `times` as large as
+    /// V predicts.
     fn in_noise(self, times: f64) -> Self {
         Self { a: self.a.map(|a| a / times), q: self.q.map(|q| q / times) }
     }
 
-    /// M and its determinant.
+    /// Returns the upper triangle of M, and its determinant.
     fn with(&self, precision: f64) -> ([f64; 3], f64) {
         let m = [self.a[0] + precision, self.a[1], self.a[2] + precision];
         (m, m[0] * m[2] - m[1] * m[1])
@@ -198,7 +206,7 @@ impl Heard {
         [(d * x - b * y) / det, (a * y - b * x) / det]
     }
 
-    /// The segment's part of ln B.
+    /// Returns the segment's part of ln B.
     fn ln_factor(&self, precision: f64) -> f64 {
         let (_, det) = self.with(precision);
         let best = self.likeliest(precision);
@@ -206,8 +214,8 @@ impl Heard {
     }
 }
 
-/// Returns the root mean square over segments of the most likely amplitude, each weighted by its
-/// information.
+/// Returns the root mean square, over segments, of the most likely amplitude. Each segment is
+/// weighted by its information.
 fn rms_amplitude(heard: &[Heard], precision: f64) -> f64 {
     let (mut sum, mut weight) = (0.0, 0.0);
     for own in heard {
@@ -234,8 +242,9 @@ mod tests {
     const TRIAL: usize = 2000;
     const TRIALS: usize = 8;
 
-    /// Returns what is found for a parameter that drifts by the described size and with a
-    /// correlation time, and swings at 0.7 Hz with an amplitude in multiples of the drift.
+    /// Returns the swing that is found for a parameter that drifts and swings. The drift has the
+    /// described size and the correlation time `time_s`. The swing has a frequency of 0.7 Hz and
+    /// the given amplitude, in multiples of the drift's standard deviation.
     fn found(seed: u64, time_s: f64, amplitude: f64) -> Swing {
         let mut random = RandomGenerator::new(seed, 0);
         let samples = TRIAL * TRIALS;
@@ -289,7 +298,8 @@ mod tests {
                 let swing = found(seed, time_s, amplitude);
                 assert!(swing.probability > 0.95, "{swing:?}");
                 approx::assert_abs_diff_eq!(swing.hertz, 0.7, epsilon = 0.025);
-                // in the parameter's unit: one multiple is 3
+                // The amplitude is in the parameter's unit: one standard deviation of the drift is
+                // 3.
                 approx::assert_relative_eq!(swing.amplitude, 3.0 * amplitude, max_relative = 0.3);
             }
         }

@@ -1,22 +1,23 @@
-//! Decides whether a residual is a function of what was recorded, or random in time. Two hypotheses
-//! are weighed on samples that neither was fitted to.
+//! Decides whether a residual is a function of the recorded signals, or random in time. Two
+//! hypotheses are compared on held-out samples, to which neither was fitted.
 //!
 //! | hypothesis | residual |
 //! | --- | --- |
-//! | function | many terms at once, or a few, and a stationary coloured process of what they leave |
-//! | coloured | a stationary coloured process alone, that looks at no input |
+//! | function | a sum of terms (either many or a few) plus a stationary coloured process |
+//! | coloured | a stationary coloured process alone, which depends on no recorded signal |
 //!
-//! Both processes are autoregressions, fitted by least squares on the fitted samples (Box and
-//! Jenkins 1970, chapter 7) to means over a tenth of a second, with a memory of 0.5 s. Their
-//! one-step predictions of the held-out samples are scored by
+//! Both processes are autoregressions of means over 0.1 s with a memory of 0.5 s. They are fitted
+//! to the fitted samples by least squares (Box and Jenkins 1970, chapter 7). With the errors e of
+//! their one-step predictions in the held-out samples, and the variance s^2 of these errors in the
+//! fitted samples, the score is
 //!
 //! ```text
 //! L = -0.5 sum (ln 2 pi s^2 + e^2/s^2)
 //! ```
 //!
-//! A function of slow inputs is slow, so a coloured process predicts it, too, but no better than
-//! the function does. Noise that switches or jumps independently is predicted no better by any
-//! term. A sum of k terms was chosen from a library of M, which costs ln M for each.
+//! A function of slow signals is slow, so a coloured process predicts it, too, but not better than
+//! the function does. If the residual switches or jumps independently of the signals, no term
+//! improves the prediction. k terms that were chosen from a library of M cost k ln M.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -27,11 +28,12 @@ use crate::{
 
 /// Order of the autoregression.
 const ORDER: usize = 5;
-/// Means per block.
+/// Number of means per block.
 const PER_BLOCK: usize = 5;
 
-/// ln of the odds of a function against the coloured process alone, nats; both residuals over whole
-/// segments, without nuisances.
+/// Returns ln of the odds of a function against the coloured process alone, nats. `alone` is the
+/// residual, `beside` the residual minus the function, both over whole segments and without
+/// nuisances. `chosen` terms were chosen from `of`.
 pub(crate) fn odds(
     roles: &SampleRoles,
     alone: &[f64],
@@ -42,7 +44,7 @@ pub(crate) fn odds(
     log_score(roles, beside) - log_score(roles, alone) - chosen as f64 * (of as f64).ln()
 }
 
-/// L of the held-out samples.
+/// Returns L of the module documentation for the held-out samples.
 fn log_score(roles: &SampleRoles, residual: &[f64]) -> f64 {
     let count = (roles.block / PER_BLOCK).max(1);
     let means = |role: Role| -> Vec<Vec<f64>> {
@@ -51,8 +53,8 @@ fn log_score(roles: &SampleRoles, residual: &[f64]) -> f64 {
         parts.map(|s| residual[s.from..s.to].chunks_exact(count).map(mean).collect()).collect()
     };
     let fitted = means(Role::Fit);
-    // Without held-out samples both are scored on the fitted ones; only the cost of the choice is
-    // left.
+    // If there are no held-out samples, both hypotheses are scored on the fitted samples; only the
+    // cost of the choice then guards against chance.
     let held = if roles.count(Role::Held) > 0 { means(Role::Held) } else { fitted.clone() };
     let weights = autoregression(&fitted);
     let (mut sum, mut n) = (0.0, 0.0);
@@ -65,7 +67,7 @@ fn log_score(roles: &SampleRoles, residual: &[f64]) -> f64 {
     held.iter().flat_map(|part| innovations(part, &weights)).map(one).sum()
 }
 
-/// Weights of the last [`ORDER`] means and a constant, by least squares.
+/// Returns the weights of the last [`ORDER`] means and of a constant, by least squares.
 pub(super) fn autoregression(parts: &[Vec<f64>]) -> Vec<f64> {
     let n = ORDER + 1;
     let (mut normal, mut right) = (DMatrix::zeros(n, n), DVector::zeros(n));
@@ -79,7 +81,7 @@ pub(super) fn autoregression(parts: &[Vec<f64>]) -> Vec<f64> {
     weights
 }
 
-/// Residual that the weights do not predict.
+/// Returns the part of the residual that the weights do not predict.
 pub(super) fn innovations<'a>(
     part: &'a [f64],
     weights: &'a [f64],

@@ -1,16 +1,17 @@
-//! Describes how a residual that no recorded signal explains behaves in time: its time stamps
-//! jitter, it swings, jumps or drifts.
+//! Describes the course in time of a residual that no recorded signal explains. There are four
+//! courses: time stamps jitter, or the residual swings, jumps or drifts.
 //!
 //! The residual r of N samples is in multiples of the noise, over stretches without a break. A
-//! course has to explain at least half of the power above the noise, sum r^2 - N; jumps, at least
-//! half of that of the changes d_i = r_(i+1) - r_i, sum d^2 - 2 N. The first that does is reported:
+//! course has to explain at least half of the power above the noise, sum r^2 - N. Jumps have to
+//! explain at least half of the same power of the changes d_i = r_(i+1) - r_i, which is sum d^2 - 2
+//! N. The first course in the table that does is reported:
 //!
 //! | course | explained part | numbers |
 //! | --- | --- | --- |
-//! | jitters | noise that follows the rate, if it is the most likely: [`jitter`](super::jitter) | standard deviation of the time |
+//! | jitters | noise that follows the rate, if this is the most likely cause: [`jitter`](super::jitter) | standard deviation of the time error |
 //! | swings | sines of one frequency f, of any phase in each stretch: sum over stretches (2/n) \|sum r exp(-i 2 pi f t)\|^2 | f, and the amplitude |
 //! | jumps | changes of more than six noises: sum of their d_i^2 | how many a second, and their root mean square |
-//! | drifts | the rest, if no other course does | root mean square, and the time after which the autocorrelation has fallen to 1/e |
+//! | drifts | reported if no other course explains enough | root mean square, and the time after which the autocorrelation has fallen to 1/e |
 
 use std::f64::consts::TAU;
 
@@ -19,12 +20,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::missing::{jitter::jitter_sd_s, proposed::three_digits};
 
-/// Share of what exceeds the noise that a course has to explain.
+/// Share of the power above the noise that a course has to explain.
 const SHARE: f64 = 0.5;
-/// A change of this many multiples of the noise is a jump: chance makes one of 3e4 samples in a
-/// thousand records.
+/// A change by more than this many multiples of the noise is a jump. By chance, one such change
+/// occurs in a thousand recordings of 3e4 samples each.
 const JUMP: f64 = 6.0;
-/// Periods that a stretch must hold for a frequency to count.
+/// Smallest number of periods that a stretch must contain for a frequency to count.
 const TURNS: f64 = 3.0;
 /// Largest frequency, in periods per sample.
 const QUICKEST: f64 = 0.4;
@@ -62,9 +63,10 @@ pub enum Course {
 }
 
 impl Course {
-    /// The course of a residual in multiples of the noise, whose standard deviation is `noise`;
-    /// `dt_s` is the sample time, and `shown` is the simulator's output at the same samples, also
-    /// in multiples of the noise. `None` if there is only noise.
+    /// Returns the course of a residual in multiples of the noise. `noise` is the standard
+    /// deviation of the noise in the unit of the channel, and `dt_s` the sample time. `shown` is
+    /// the simulator's output at the same samples, also in multiples of the noise. `None` if there
+    /// is only noise.
     pub(crate) fn of(
         stretches: &[&[f64]],
         shown: &[Vec<f64>],
@@ -93,7 +95,7 @@ impl Course {
         Some(swings().or_else(|| jumps(stretches, noise, dt_s)).unwrap_or_else(drifts))
     }
 
-    /// In words, with the unit of the channel.
+    /// Describes the course in words, with the unit of the channel.
     pub(crate) fn words(&self, unit: &str) -> String {
         let sized = |size: f64| format!("{} {unit}", three_digits(size)).trim_end().to_owned();
         match *self {
@@ -124,8 +126,8 @@ impl Course {
     }
 }
 
-/// The frequency, in periods per sample, whose sines explain most of the squares, and how much they
-/// explain.
+/// Returns the frequency, in periods per sample, whose sines explain most of the sum of squares,
+/// and how much they explain.
 fn strongest(stretches: &[&[f64]]) -> Option<(f64, f64)> {
     let longest = stretches.iter().map(|s| s.len()).max()? as f64;
     let step = 0.5 / longest;
@@ -135,8 +137,8 @@ fn strongest(stretches: &[&[f64]]) -> Option<(f64, f64)> {
     all.map(|turns| (turns, taken(turns))).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Sum of squares that a sine explains of a stretch: (2/n) |sum r exp(-i w t)|^2, by Goertzel's
-/// recursion (1958, doi 10.2307/2310304).
+/// Returns the sum of squares that a sine explains in a stretch, (2/n) |sum r exp(-i w t)|^2, by
+/// Goertzel's recursion (1958, doi 10.2307/2310304).
 fn taken(stretch: &[f64], turns: f64) -> f64 {
     let twice = 2.0 * libm::cos(TAU * turns);
     let (mut last, mut before) = (0.0, 0.0);
@@ -171,7 +173,7 @@ fn forgotten_after(stretches: &[&[f64]]) -> usize {
     let least = product(1) / std::f64::consts::E;
     let mut lag = 1;
     while lag < longest && product(lag) > least {
-        // Every lag up to 20, then in steps of a twentieth of the lag.
+        // Try every lag up to 20, then proceed in steps of a twentieth of the lag.
         lag += 1 + lag / 20;
     }
     lag
@@ -192,7 +194,7 @@ mod tests {
 
     fn of(values: &[f64]) -> Option<Course> {
         let stretches: Vec<&[f64]> = values.chunks(6000).collect();
-        // Nothing moves, so jitter of time stamps is invisible.
+        // The simulated output is constant, so jitter of time stamps is invisible.
         let still: Vec<Vec<f64>> = stretches.iter().map(|s| vec![0.0; s.len()]).collect();
         Course::of(&stretches, &still, 0.002, DT_S)
     }
@@ -202,14 +204,14 @@ mod tests {
         for (hertz, size) in [(0.07, 3.0), (0.7, 1.5), (11.3, 4.0)] {
             let found = of(&beside_noise(|i| size * libm::sin(TAU * hertz * DT_S * i as f64), 1));
             let Some(Course::Swings { hertz: f, amplitude }) = found else { panic!("{found:?}") };
-            // The grid is half a period in the longest stretch; off the grid the sine explains
-            // less.
+            // Frequencies are tried in steps of half a period per longest stretch. Between two of
+            // them, a sine explains less.
             assert!((f - hertz).abs() <= 0.5 / 60.0 + 1e-9, "{f} for {hertz}");
             assert!((amplitude / (0.002 * size) - 1.0).abs() < 0.25, "{amplitude} for {size}");
         }
     }
 
-    /// Steps that occur twice a second on average.
+    /// Jumps that occur twice a second on average are counted and measured.
     #[test]
     fn jumps_are_counted_and_measured() {
         let mut random = RandomGenerator::new(3, 1);
@@ -224,7 +226,7 @@ mod tests {
             .collect();
         let found = of(&beside_noise(|i| course[i], 2));
         let Some(Course::Jumps { per_s, size }) = found else { panic!("{found:?}") };
-        // 240 are expected, sqrt(240) = 15 of them by chance.
+        // 240 jumps are expected, with a standard deviation of sqrt(240) = 15.
         assert!((1.6..2.4).contains(&per_s), "{per_s}");
         assert!((size / 0.024 - 1.0).abs() < 0.05, "{size}");
     }
@@ -242,7 +244,8 @@ mod tests {
             .collect();
         let found = of(&beside_noise(|i| course[i], 4));
         let Some(Course::Drifts { size, correlation_s }) = found else { panic!("{found:?}") };
-        // 150 correlation times determine a variance to a tenth, and the time to about a fifth.
+        // 150 correlation times determine a variance to 10 %, and the correlation time to about 20
+        // %.
         assert!((size / 0.006 - 1.0).abs() < 0.2, "{size}");
         assert!((0.5..1.2).contains(&correlation_s), "{correlation_s}");
     }

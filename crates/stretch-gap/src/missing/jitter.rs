@@ -1,15 +1,18 @@
 //! Tests whether time stamps jitter. If they do, the noise follows the rate of the signal.
 //!
-//! A sample that is taken at a random time away from its stamp shows the signal of that time. In
-//! addition to the noise of the sensor, r then has a part of the standard deviation `sd_s |dy/dt|`
-//! that is independent of the previous sample. What an autoregression does not predict of r,
+//! If a sample is taken at another time than its time stamp says, it shows the signal y at that
+//! time. If this time error is random with the standard deviation `sd_s`, the residual r contains,
+//! in addition to the noise of the sensor, a part of the standard deviation `sd_s |dy/dt|` that is
+//! independent of the previous sample. An autoregression with the weights w does not predict this
+//! part. Its error is
 //!
 //! ```text
 //! e_i = r_i - sum w_k r_{i-k},   var e_i = a + b g_i,   g_i = v_i^2 + sum w_k^2 v_{i-k}^2
 //! ```
 //!
-//! with v the rate of the simulated output, has b = `sd_s`^2 if time stamps jitter, whatever the
-//! colour of the rest. Three hypotheses are weighed by their likelihoods at their best scales:
+//! where v is the rate of the simulated output. If time stamps jitter, b is `sd_s`^2, whatever the
+//! spectrum of the rest of the residual is. Three hypotheses about the scale of e are compared by
+//! their likelihoods, each with its best values of a and b:
 //!
 //! | hypothesis | scale of e |
 //! | --- | --- |
@@ -17,12 +20,13 @@
 //! | by level | a + b (y - mean)^2: a sensor whose noise grows with its value |
 //! | jitter | a + b g |
 //!
-//! In all three, e follows Student's t with 3, 10 or 1e6 (Gaussian) degrees of freedom, so that a
-//! few jumps do not count as scale (Lange, Little and Taylor 1989, doi
-//! 10.1080/01621459.1989.10478852). The second parameter costs half of ln n. Jitter is accepted if
-//! it is the most likely cause and if it explains as large a share of the residual beyond the noise
-//! as a [course in time](super::course) has to explain. Errors of samples that are late, or wrong
-//! whenever the signal moves, are predicted by the previous sample and leave little in e.
+//! In all hypotheses, e follows Student's t distribution with 3, 10 or 1e6 (Gaussian) degrees of
+//! freedom, so that a few jumps do not change the scale much (Lange, Little and Taylor 1989, doi
+//! 10.1080/01621459.1989.10478852). For n samples, the parameter b costs half of ln n. Jitter is
+//! accepted if it is the most likely hypothesis, and if it explains as large a share of the
+//! residual's power above the noise as a [course in time](super::course) has to explain. Constant
+//! delays and other errors that persist while the signal moves are predicted from the previous
+//! samples and leave little in e.
 
 use crate::missing::{
     coloured::{autoregression, innovations},
@@ -31,23 +35,23 @@ use crate::missing::{
 
 /// Degrees of freedom; the last is Gaussian.
 const DEGREES: [f64; 3] = [3.0, 10.0, 1e6];
-/// Logarithms of b over a at the mean of the regressor: jitter from a hundredth of the noise's
-/// variance to a million times it.
+/// Range of the logarithm of b/a times the mean of the regressor: jitter from a hundredth of the
+/// noise's variance to a million times this variance.
 const RATIOS: [f64; 2] = [-4.6, 13.8];
-/// Steps of a golden section over these logarithms, which determine them to a hundredth, and steps
-/// of the fixed-point iteration of the scale.
+/// Number of steps of a golden-section search over the range [`RATIOS`], which determine the
+/// logarithm to about 0.01; and number of steps of the fixed-point iteration for the scale.
 const SECTIONS: usize = 16;
 const ROUNDS: usize = 12;
-/// Fewest samples for a comparison: a scale, a slope, and the weights of the past have to be
-/// estimated.
+/// Smallest number of samples for the test: a scale, a slope, and the weights of the autoregression
+/// have to be estimated.
 const LEAST: usize = 60;
 
-/// Standard deviation of the time between samples and their stamps, s; `None` if something else
-/// explains the residual better.
+/// Returns the standard deviation of the time between samples and their time stamps, s; `None` if
+/// another hypothesis explains the residual better.
 ///
-/// `stretches` are residuals in multiples of the noise; `shown` is the simulated value of each
-/// sample in the same unit; `dt_s` is the sample time. Jitter has to explain a sum of squares of
-/// `least`.
+/// `stretches` are residuals in multiples of the noise. `shown` holds the simulated value of each
+/// sample in the same unit, and `dt_s` is the sample time. Jitter has to explain a sum of squares
+/// of at least `least`.
 pub(super) fn jitter_sd_s(
     stretches: &[&[f64]],
     shown: &[Vec<f64>],
@@ -85,14 +89,15 @@ pub(super) fn jitter_sd_s(
     (made >= least).then(|| variance_s2.sqrt())
 }
 
-/// A hypothesis at its best scale.
+/// A hypothesis with its most likely scale.
 struct Scaled {
     log_likelihood: f64,
     /// Variance per unit of the regressor.
     slope: f64,
 }
 
-/// The best over all degrees of freedom and, with a regressor, over all ratios.
+/// Returns the most likely hypothesis over all degrees of freedom and, if there is a regressor,
+/// over all ratios.
 fn best(e: &[f64], by: Option<&[f64]>) -> Scaled {
     let mean = by.map_or(1.0, |by| by.iter().sum::<f64>() / by.len() as f64);
     let one = |degrees: f64| {
@@ -100,7 +105,7 @@ fn best(e: &[f64], by: Option<&[f64]>) -> Scaled {
             let ratio = log_ratio.exp() / mean;
             let shape = |i: usize| 1.0 + by.map_or(0.0, |by| ratio * by[i]);
             let (log_likelihood, scale) = scaled(e, shape, degrees);
-            // The variance of Student's t.
+            // Student's t with scale 1 has the variance degrees/(degrees - 2).
             Scaled { log_likelihood, slope: ratio * scale * degrees / (degrees - 2.0) }
         };
         if by.is_none() { at(RATIOS[0]) } else { section(at) }
@@ -109,7 +114,7 @@ fn best(e: &[f64], by: Option<&[f64]>) -> Scaled {
     all.max_by(|a, b| a.log_likelihood.total_cmp(&b.log_likelihood)).expect("there are degrees")
 }
 
-/// The greatest likelihood over the ratios, by golden section.
+/// Returns the hypothesis with the greatest likelihood over the ratios, by golden-section search.
 fn section(at: impl Fn(f64) -> Scaled) -> Scaled {
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     let [mut low, mut high] = RATIOS;
@@ -129,8 +134,9 @@ fn section(at: impl Fn(f64) -> Scaled) -> Scaled {
     if a.log_likelihood >= b.log_likelihood { a } else { b }
 }
 
-/// ln of the likelihood of Student's t with the variance scale times a shape, without the constant
-/// of its degrees of freedom, and the most likely scale by a fixed-point iteration.
+/// Returns the logarithm of the likelihood of `e` under Student's t, and the most likely scale, by
+/// a fixed-point iteration. The squared width of the distribution is the scale times `shape` of the
+/// sample.
 fn scaled(e: &[f64], shape: impl Fn(usize) -> f64, degrees: f64) -> (f64, f64) {
     let n = e.len() as f64;
     let squares: Vec<f64> = e.iter().enumerate().map(|(i, e)| e * e / shape(i)).collect();

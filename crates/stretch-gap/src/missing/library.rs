@@ -1,17 +1,17 @@
-//! The library: every term that a stage may lack. It was written from physics, before any of the
-//! cases by which it is evaluated.
+//! The library: all terms that are considered as missing in a stage. It was written from physics,
+//! before any of the cases with which it is evaluated.
 //!
-//! | kind | terms of a state x with rate v | describes |
+//! | kind | terms of a signal x with rate v | describes |
 //! | --- | --- | --- |
 //! | curve | x^p, (x - centre)^p, knees at quantiles, exp(-x/w) at either end, waves of x | scales, ends, contacts, threads |
-//! | friction | v, abs v, v^2, sign v, striction, each times x | viscous, dry, sticking |
-//! | memory | x - play, x - lag, late x, way since a turn, greatest x; times x and the motion | backlash, relaxation, delay, hysteresis, damage |
-//! | slow | lags of what was dissipated, travel, time in the trial, session; times x | warming, wear, drift |
-//! | crossing | one signal's x times another's x, v, memory | coupling |
-//! | commands | an opening, its lag, times x; as a rate that leaks through the openings | valves, supply |
+//! | friction | v, abs v, v^2, sign v, friction that fades with speed; each also times x | viscous, dry and sticking friction |
+//! | memory | play, lag, delay, way since a reversal, or maximum of x; times x, or v | backlash, relaxation, delay, hysteresis, damage |
+//! | slow | lags of x^2 and of friction terms, travel, time in the trial or session; also times x | warming, wear, drift |
+//! | crossing | x of one signal times x, v or a memory of another | coupling |
+//! | commands | opening of a valve, its lag, both also times x; a rate that leaks through the openings | valves, supply |
 //!
-//! The parts of a term that parameters of the nominal simulator could explain are projected out, so
-//! terms need not be centred.
+//! The part of a term that parameters of the nominal simulator could explain is projected out.
+//! Therefore terms need not have a mean of zero.
 
 use crate::missing::{
     term::{Factor, Passage, RateForm, Term},
@@ -25,20 +25,22 @@ use Factor::{
 };
 use RateForm::{Linear, Magnitude, Rising, Sign, SignedRoot, SignedSquare, Square, Striction};
 
-/// Half-widths of plays, and widths of exponentials and of turns, as shares of the range.
+/// Half-widths of plays, and widths of the exponentials in x and in the way since a reversal, as
+/// shares of the range.
 const WIDTHS: [f64; 5] = [0.015, 0.04, 0.1, 0.2, 0.4];
-/// Quantiles at which knees lie.
+/// Quantiles of the signal at which knees lie.
 const QUANTILES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
-/// Periods of waves over the range.
+/// Numbers of periods of the waves over the range.
 const TURNS: [f64; 7] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0];
 /// Delays, in samples.
 const DELAYS: [f64; 4] = [2.0, 5.0, 12.0, 30.0];
-/// Number of time constants, in equal ratios from three samples to the longest fitted trial.
+/// Number of time constants. They are spaced in equal ratios from three samples to the longest
+/// fitted trial.
 const TIMES: usize = 8;
-/// Travel, in ranges, over which something wears in.
+/// Distances of travel over which something wears in, in multiples of the range.
 const WEAR: [f64; 2] = [2.0, 8.0];
 
-/// Collects terms.
+/// Collects the terms of the library.
 struct Shelf<'a> {
     inputs: &'a TermInputs,
     roles: &'a SampleRoles,
@@ -207,7 +209,7 @@ impl Shelf<'_> {
         }
     }
 
-    /// `s` times the terms of another signal.
+    /// Adds x of the signal `s` times the terms of the signal `other`.
     fn crossing(&mut self, s: usize, other: usize) {
         let x = power(s, 1.0);
         if s < other {
@@ -246,7 +248,7 @@ impl Shelf<'_> {
         }
     }
 
-    /// Adds terms that act in the rate of an output. The output is their integral, which leaks in
+    /// Adds terms that act on the rate of the output. The output is their integral, which leaks in
     /// proportion to the openings.
     fn rates(&mut self, states: &[usize], commands: &[usize]) {
         let mut sources = vec![Vec::new(), vec![Session { power: 1.0 }], vec![Time { power: 1.0 }]];

@@ -1,15 +1,16 @@
-//! Proposes an equation for a cause outside the catalogue: a sparse sum of terms of what was
-//! recorded, for the stage with most of the gap.
+//! Proposes an equation for a cause outside the catalogue: a sum of a few terms that are functions
+//! of the recorded signals, for the stage with the largest gap.
 //!
-//! A discrepancy between simulator and rig can be learnt as a few terms of a library (Kaheman et
-//! al. 2019, arXiv 1909.08574). The nominal parameters have to be fitted together with the terms,
-//! because otherwise terms compensate for wrong parameters (Brynjarsdottir and O'Hagan 2014, doi
-//! 10.1088/0266-5611/30/11/114007).
+//! A discrepancy between simulator and rig can be learnt as a sum of a few terms that are chosen
+//! from a library (Kaheman et al. 2019, arXiv 1909.08574). The nominal parameters have to be fitted
+//! together with the terms, because otherwise terms would compensate for wrong parameters
+//! (Brynjarsdottir and O'Hagan 2014, doi 10.1088/0266-5611/30/11/114007).
 //!
 //! Input: a prepared problem and its best hypothesis. Output: a [`Proposed`] sum of terms, or none.
-//! Recorded [`signals`] span a [`library`] of [`term`]s. Sparse regression ([`sparse`]) on the
-//! [`residue`] chooses a few. [`coloured`] noise decides whether they are more than chance.
-//! [`mod@propose`] runs all steps. Imports: `numerics`, `problem`, `fit`.
+//! A [`library`] contains [`term`]s of the recorded [`signals`]. Sparse regression ([`sparse`])
+//! chooses a few that explain the residual ([`residue`]). A comparison with [`coloured`] noise
+//! decides whether they are more than chance. [`mod@propose`] runs all steps. Uses the modules
+//! `numerics`, `problem` and `fit`.
 
 mod coloured;
 mod course;

@@ -1,4 +1,4 @@
-//! Proposes a sum of terms for what a model leaves.
+//! Proposes a sum of terms for the residual that a model leaves.
 
 use crate::missing::{
     coloured::odds,
@@ -17,7 +17,7 @@ use crate::{
     },
 };
 
-/// Gauss-Newton steps, each with a whole run of the moved model.
+/// Number of Gauss-Newton steps, each with a full simulation of the moved model.
 const STEPS: usize = 2;
 
 /// A sum of terms, fitted together with the parameters of the model.
@@ -30,22 +30,22 @@ struct Estimated {
     left: Column,
 }
 
-/// A sum of terms for what is missing.
+/// A proposed sum of terms.
 pub(crate) struct Proposal {
     pub(crate) told: Proposed,
-    /// The stage that it acts in.
+    /// The stage in which the sum acts.
     pub(crate) stage: usize,
-    /// Misfits of all stages with it.
+    /// Misfits of all stages with the sum.
     pub(crate) misfits: Vec<Misfit>,
     /// Number of terms in the library.
     pub(crate) library: usize,
 }
 
-/// Proposes what is missing in the stage with most of a hypothesis's gap; `None` if no stage has
-/// one.
+/// Proposes a sum of terms that a hypothesis lacks, for the stage with the largest gap; `None` if
+/// no stage has a gap.
 ///
-/// Everything is chosen and fitted without the test trials. These are read at the end, for the
-/// reported share.
+/// Everything is chosen and fitted without the test trials. The test trials are read at the end, to
+/// compute the share of the gap that the sum closes.
 pub(crate) fn propose(
     problem: &PreparedProblem<'_>,
     base: &Hypothesis,
@@ -75,20 +75,21 @@ pub(crate) fn propose(
 
 /// Evaluation of a sum on the held-out samples.
 struct Weighed {
-    /// ln of the odds that the residual is a function of what was recorded.
+    /// ln of the odds that the residual is a function of the recorded signals.
     log_odds: f64,
     /// Whether the sum is that function.
     stands: bool,
-    /// Shares of the gap that the sum closes and that many terms predict.
+    /// Share of the gap that the sum closes, and share that many terms of the library together
+    /// predict.
     closes: f64,
     predicted: f64,
-    /// Course of the residual in time, if it is not a function of what was recorded.
+    /// Course of the residual in time, if it is not a function of the recorded signals.
     course: Option<Course>,
 }
 
-/// Evaluates a sum on the held-out samples. Many terms at once decide whether the residual is a
-/// function of what was recorded at all, and the sum, whether it is that function. The few terms of
-/// the sum could have been chosen by chance.
+/// Evaluates a sum on the held-out samples. Whether the residual is a function of the recorded
+/// signals at all is decided with many terms at once, because the few terms of the sum could have
+/// been chosen by chance. Whether the sum is this function is then decided with the sum itself.
 fn weigh(
     residue: &Residue<'_>,
     choice: &SampleRoles,
@@ -102,7 +103,7 @@ fn weigh(
         values
     };
     let (alone, beside) = (clean(&residue.residual), clean(&estimated.left));
-    // A function has at least one term of the library.
+    // The cost of the choice is that of one term, because a function has at least one.
     let log_odds = odds(choice, &alone, &sum.beside_many, 1, sum.library);
     let stands = log_odds > 0.0
         && !sum.terms.is_empty()
@@ -132,7 +133,7 @@ fn weigh(
     })
 }
 
-/// Returns a proposal as it is reported.
+/// Returns the report of a proposal.
 fn proposed(
     residue: &Residue<'_>,
     sum: &Sum,
@@ -174,16 +175,18 @@ fn proposed(
     proposed
 }
 
-/// Share of a gap that is closed, from sums of squares over a number of samples.
+/// Returns the share of a gap that is closed, computed from the sums of squares before and after,
+/// over a number of samples.
 fn closed(before: f64, after: f64, samples: usize) -> f64 {
     let gap = |squares: f64| squares - samples as f64;
     if gap(before) > 0.0 { 1.0 - gap(after).max(0.0) / gap(before) } else { 0.0 }
 }
 
-/// Fits parameters and coefficients to the fitted samples. Linearised changes are replaced by whole
-/// runs as long as these lower the cost.
+/// Fits parameters and coefficients to the fitted samples. The fit is linear at first. Then the
+/// linearised change of the model is replaced by a full simulation, as long as this lowers the
+/// cost.
 fn estimate(residue: &Residue<'_>, choice: &SampleRoles, sum: &Sum) -> Result<Estimated, GapError> {
-    // Trials that were held out only for the choice of terms are fitted now.
+    // Trials that were held out only to choose the terms are fitted now.
     let roles = match choice.count(Role::Held) == residue.roles().count(Role::Held) {
         true => choice,
         false => residue.roles(),
@@ -239,7 +242,7 @@ fn left(
     residue.compare.metrics[residue.stage].column(residue.roles(), values)
 }
 
-/// Share of the gap on the test trials that a refitted sum closes.
+/// Returns the share of the gap on the test trials that a refitted sum closes.
 fn tested(residue: &Residue<'_>, terms: &[Term], estimated: &Estimated) -> Result<f64, GapError> {
     let (compare, stage) = (residue.compare, residue.stage);
     let trials = compare.simulator().trials().len();
@@ -264,9 +267,10 @@ fn tested(residue: &Residue<'_>, terms: &[Term], estimated: &Estimated) -> Resul
     Ok(closed(before, square(values), roles.count(Role::Test)))
 }
 
-/// Proposes a sum of terms for what is left: by the best set if this set has `names`, otherwise by
-/// the re-tuned nominal simulator, for which the proposal may be `known` already. A sum that closes
-/// nothing on the test trials is dropped.
+/// Proposes a sum of terms for the remaining residual. If `names` is true, i.e. effects are named,
+/// this is the residual of the best set of effects. Otherwise it is the residual of the re-tuned
+/// nominal simulator; its proposal may be `known` already. A sum that closes nothing on the test
+/// trials is dropped.
 pub(crate) fn propose_for(
     problem: &PreparedProblem<'_>,
     best: &Hypothesis,

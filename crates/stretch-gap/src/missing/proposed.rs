@@ -83,7 +83,7 @@ pub struct Proposed {
     pub sentence: String,
 }
 
-/// Signals of a record that terms refer to.
+/// Returns the signals of a recording to which terms refer.
 pub(crate) fn scales(inputs: &TermInputs) -> Vec<SignalScale> {
     let one = |s: &super::term_inputs::Signal| SignalScale {
         name: s.name.clone(),
@@ -96,7 +96,7 @@ pub(crate) fn scales(inputs: &TermInputs) -> Vec<SignalScale> {
     inputs.signals.iter().map(one).collect()
 }
 
-/// `channel += ...`, and the meaning of its letters.
+/// Returns the equation `channel += ...`, followed by the definitions of its symbols.
 pub(crate) fn equation(channel: &str, terms: &[ProposedTerm], signals: &[SignalScale]) -> String {
     if terms.is_empty() {
         return String::new();
@@ -133,7 +133,7 @@ pub(crate) fn equation(channel: &str, terms: &[ProposedTerm], signals: &[SignalS
     format!("{channel} += {}{with}", sum.join(" + "))
 }
 
-/// A term in words.
+/// Returns a term as text, as it is written in the equation.
 pub(crate) fn words(term: &Term, signals: &[SignalScale]) -> String {
     let factors: Vec<String> = term.factors.iter().map(|f| factor(*f, signals)).collect();
     let product = if factors.is_empty() { "1".to_owned() } else { factors.join(" ") };
@@ -211,7 +211,7 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
     }
 }
 
-/// Where a sum acts.
+/// Returns a text that tells where a sum acts.
 pub(crate) fn acts(stage: &str, terms: &[ProposedTerm]) -> String {
     let is_rate = |t: &ProposedTerm| matches!(t.form.passage, Passage::Leak { .. });
     match terms.iter().any(is_rate) {
@@ -223,7 +223,7 @@ pub(crate) fn acts(stage: &str, terms: &[ProposedTerm]) -> String {
 /// Summarises a proposal in one sentence.
 pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
     let Proposed { stage, channel, equation, closes_test, .. } = proposed;
-    // Leave out the definitions of the letters, which follow the semicolon.
+    // Leave out the definitions of the symbols, which follow the semicolon.
     let equation = equation.split(';').next().unwrap_or_default();
     match (proposed.random, proposed.terms.is_empty()) {
         (true, _) => {
@@ -243,7 +243,7 @@ pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
     }
 }
 
-/// Three significant digits.
+/// Formats a number with three significant digits.
 pub(super) fn three_digits(x: f64) -> String {
     let size = x.abs();
     if size == 0.0 {

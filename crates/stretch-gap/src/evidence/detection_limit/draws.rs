@@ -1,5 +1,6 @@
-//! Draws recordings in the space of the changes by a few effects, and counts how often the rule of
-//! the verdict names one of these effects.
+//! Draws random recordings of a rig with one effect, and counts how often the rule of the verdict
+//! names this effect. Recordings are not drawn sample by sample, but as projections on the changes
+//! of the output by this effect and by the effects that resemble it.
 
 use nalgebra::DMatrix;
 
@@ -28,33 +29,35 @@ use crate::{
     },
 };
 
-/// Records that are drawn: a probability of 0.9 is known to 0.02.
+/// Number of recordings that are drawn. They determine a probability of 0.9 to 0.02.
 const DRAWS: usize = 200;
 /// Probability with which an effect at its limit is named.
 const POWER: f64 = 0.9;
-/// Largest number of probes that an effect is compared with, and the smallest squared correlation
-/// of their changes with its own. At 0.5 an alternative promises half as much as the best.
+/// An effect is compared with at most [`HELD_AGAINST`] probes of other effects, and only with those
+/// whose change of the output has a squared correlation of more than [`ALIKE`] with its own. An
+/// alternative with a squared correlation of 0.5 explains half as much as the effect itself.
 const HELD_AGAINST: usize = 8;
 const ALIKE: f64 = 0.3;
 
-/// Parts of the record: fitted, held out, test.
+/// Roles of the samples: fitted, held out, test.
 const ROLES: [Role; 3] = [Role::Fit, Role::Held, Role::Test];
 
-/// One stage in the space of the changes of some probes.
+/// One stage, projected on the changes of the output by some probes. Let u_i be the change by probe
+/// i, V the metric of the stage and n the noise.
 struct Place {
     stage: usize,
-    /// Products u_i'V^-1 u_j by role.
+    /// Products u_i'V^-1 u_j by role of the samples.
     gram: [DMatrix<f64>; 3],
-    /// Products over the fitted samples with which the fit weighs amplitudes, including the prior
-    /// cost of the nominal parameters.
+    /// Normal matrix of a fit of the probes' amplitudes: products over the fitted samples, plus the
+    /// prior of the nominal parameters.
     weighed: DMatrix<f64>,
     /// Variance of the noise relative to its estimate, and its autocorrelation sums.
     noise: f64,
     noise_lags: Lags,
-    /// Draws of u'V^-1 n by role, and of |n|^2/N - 1.
+    /// By draw and role: the products u_i'V^-1 n, and |n|^2/N - 1 for N samples.
     draws: Vec<[Vec<f64>; 3]>,
     squares: Vec<[f64; 3]>,
-    /// Variance of the noise to which excesses are relative: `noise`, but at most 1.
+    /// Variance of the noise to which excesses are relative: that in `noise`, but at most 1.
     level: f64,
 }
 
@@ -85,8 +88,8 @@ struct Drawn {
     standing: Standing,
     /// Share of the gap on the test trials that the effect closes.
     closed: f64,
-    /// Half the reduction of the sum of squares over the fitted samples, to compare effects as a
-    /// screen does.
+    /// Half the reduction of the sum of squares over the fitted samples. The search screens effects
+    /// by the same number.
     gain: f64,
     is_accepted: bool,
 }
@@ -117,8 +120,8 @@ impl<'a> Record<'a> {
         Self { inputs, probes, against, places, own, samples }
     }
 
-    /// Whether the effect, acting with an amplitude, is named in as many of the drawn recordings as
-    /// a detection limit requires.
+    /// Whether the effect, acting with this amplitude, is named in as many of the drawn recordings
+    /// as a detection limit requires.
     pub(super) fn names(&self, amplitude: f64) -> bool {
         // This criterion depends only on the amplitude, not on the draw.
         if self.rise(amplitude) <= self.inputs.thresholds.rise {
@@ -132,7 +135,8 @@ impl<'a> Record<'a> {
         })
     }
 
-    /// Rise of the likelihood by octaves from the nominal simulator to the effect.
+    /// Returns the rise of the log-likelihood, computed by [octaves](crate::fit::octaves), from the
+    /// nominal simulator to the simulator with the effect.
     fn rise(&self, amplitude: f64) -> f64 {
         let of = self.own.iter().map(|own| {
             let noise: Octaves = self.inputs.best.misfits[own.stage].octaves;
@@ -141,8 +145,8 @@ impl<'a> Record<'a> {
         of.sum()
     }
 
-    /// Samples that count as one observation of the nominal simulator's misfit, with the effect's
-    /// change included.
+    /// Returns how many samples count as one observation of the nominal simulator's misfit if the
+    /// effect's change is included in its residual.
     fn memory(&self, place: &Place, amplitude: f64) -> f64 {
         let change = self.own.iter().find(|c| c.stage == place.stage);
         let change = change.map(|c| (&c.lags, amplitude));
@@ -150,7 +154,7 @@ impl<'a> Record<'a> {
     }
 
     /// Returns 1 if the effect is named in one drawn recording and 0 if it is not. If several sets
-    /// are equally probable, returns the share of these that the effect has.
+    /// are equally probable, returns the share of these sets that contain the effect.
     fn named(&self, draw: usize, amplitude: f64, memory: &[f64]) -> f64 {
         let (thresholds, catalogue) =
             (self.inputs.thresholds, self.inputs.problem.simulator().effects());
@@ -251,8 +255,9 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// Returns the reduced chi-square by stage and role. `fitted` is a probe with its fitted
-    /// amplitude.
+    /// Returns the reduced chi-square by stage and role, after the fitted probe is subtracted.
+    /// `fitted` is the index of this probe with its fitted amplitude; `None` for the nominal
+    /// simulator.
     fn left(&self, draw: usize, amplitude: f64, fitted: Option<(usize, f64)>) -> Vec<[f64; 3]> {
         let one = |place: &Place| {
             std::array::from_fn(|role| {
@@ -268,7 +273,7 @@ impl<'a> Record<'a> {
         self.places.iter().map(one).collect()
     }
 
-    /// Returns the gap: the larger of those on fitted and test trials.
+    /// Returns the gap: the larger of the gaps on fitted and on test trials.
     fn gap(&self, left: &[[f64; 3]]) -> f64 {
         let compare = &self.inputs.problem.compare;
         let looked = self.places.iter().zip(left).map(|(p, x)| {
@@ -280,7 +285,8 @@ impl<'a> Record<'a> {
     }
 }
 
-/// Returns the probe, then those of other effects that can replace it, the most similar first.
+/// Returns the index of the effect's own probe, then those of the probes of other effects that can
+/// replace it, the most similar first.
 fn against(inputs: LimitInputs<'_>, probes: &Probes, own: usize) -> Vec<usize> {
     let compare = &inputs.problem.compare;
     let product = |a: &Probe, b: &Probe| -> f64 {
@@ -342,7 +348,7 @@ impl Place {
         let noise = compare.mean_square(&inputs.best.misfits[stage]).max(f64::MIN_POSITIVE);
         let noise_lags = probes.noise_lags(stage).clone();
         let memory = noise_lags.per_observation(None, compare.roles.block);
-        // Noise is correlated: `memory` of its samples count as one.
+        // Noise is correlated: a number of `memory` samples counts as one.
         let scale = (noise * memory).sqrt();
         let factors: Vec<Cholesky> =
             [&weighed, &gram[1], &gram[2]].map(|g| Cholesky::of(g.clone())).into();

@@ -1,13 +1,14 @@
-//! Computes how many samples count as one observation of a residual's mean square if the change by
-//! an effect is added to the residual.
+//! Computes how many samples count as one observation of a residual's mean square, with the change
+//! that an effect makes added to the residual.
 //!
-//! This is the sum of [`samples_per_observation`](crate::fit::score::samples_per_observation) over
-//! the first lags and every fourth of the later ones, which represents its neighbours.
-//! Autocorrelation sums of noise and of a change that is independent of it add up.
+//! The number is that of [`samples_per_observation`](crate::fit::score::samples_per_observation).
+//! To save time, only the first lags and every fourth of the later ones are summed; each of the
+//! latter stands for four lags. If noise and change are independent, their autocorrelation sums add
+//! up.
 
 use crate::{fit::comparison::Comparison, numerics::linear::dot, problem::sample_roles::Role};
 
-/// Number of first lags that are all summed, and the spacing of the later ones.
+/// The first [`EACH`] lags are all summed; later ones only in steps of [`APART`].
 const EACH: usize = 8;
 const APART: usize = 4;
 
@@ -15,7 +16,7 @@ const APART: usize = 4;
 #[derive(Debug, Clone)]
 pub(super) struct Lags {
     square: f64,
-    /// By lag: the number of lags that it represents, and the sum of products.
+    /// By summed lag: the number of lags that it stands for, and the sum of products at this lag.
     sums: Vec<(f64, f64)>,
 }
 
@@ -36,7 +37,7 @@ impl Lags {
     }
 
     /// Returns the number of samples that count as one observation, at most a block. `change` holds
-    /// the sums of a change that is added, and the factor on its amplitude.
+    /// the sums of a change that is added to the residual, and its amplitude.
     pub(super) fn per_observation(&self, change: Option<(&Self, f64)>, block: usize) -> f64 {
         let more = change.map_or(0.0, |(c, amplitude)| amplitude * amplitude * c.square);
         let power = (self.square + more).max(f64::MIN_POSITIVE);

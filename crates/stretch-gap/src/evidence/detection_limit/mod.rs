@@ -1,27 +1,30 @@
 //! Detection limits: how strong each effect would have to be to be named on these data.
 //!
-//! Assume that the re-tuned nominal simulator is true, so that what the best set leaves is noise,
-//! and add an effect of the strength s. Around a probe at the strength s_0 its change of the output
-//! is
+//! Assume that the re-tuned nominal simulator is true, that the residual of the best set of effects
+//! is noise, and that the rig has one more effect of the strength s. A *probe* is a simulation with
+//! this effect at a strength s_0. The effect changes the output by d(s), of which the nominal
+//! parameters cannot compensate the part u:
 //!
 //! ```text
 //! d(s) = (s/s_0)^(p/2) d(s_0),     u = d - A (A'V^-1 A + b I)^-1 A'V^-1 d
 //! ```
 //!
-//! in the metric V of every fit, with the sensitivities A of the nominal parameters (b samples a
-//! block, prior precision 1), and p = 2 where the change is linear. The verdict reads scores,
-//! residuals of the fitted and the test trials, and probabilities against alternatives. All of
-//! these depend on the noise n only through |n|^2 and the few products u_j'V^-1 n, which are normal
-//! with the Gram matrix u_i'V^-1 u_j as their covariance. Therefore records are drawn in the space
-//! of the effects, never as time series. The share of records in which the rule of the
-//! [posterior](crate::evidence::probability) names the effect is its power (Neyman and Pearson
-//! 1933, doi 10.1098/rsta.1933.0009). The detection limit is the strength at which the power is
-//! 0.9.
+//! V is the [metric](crate::fit::metric) of every fit and A the sensitivities to the nominal
+//! parameters, whose prior has precision 1; a block of b samples counts as one observation. If the
+//! change is linear in the strength, p is 2. The verdict depends on scores, on residuals of the
+//! fitted and the test trials, and on probabilities compared with alternatives. All of these depend
+//! on the noise n only through |n|^2 and a few products u_j'V^-1 n, one per effect j that is
+//! compared. These products are normal, and their covariance is the Gram matrix u_i'V^-1 u_j.
+//! Therefore the products are drawn instead of time series. Each draw stands for one recording. The
+//! share of these recordings in which the rule of the [posterior](crate::evidence::probability)
+//! names the effect is its power (Neyman and Pearson 1933, doi 10.1098/rsta.1933.0009). The
+//! detection limit is the strength at which the power is 0.9.
 //!
-//! An effect's other parameters have the values of the start from which it is detected most easily.
-//! Alternatives are taken at up to two of their starts. The power law holds only near the probe (an
-//! effect may have a kink). Therefore a limit far from its probe is probed again, and p comes from
-//! the last two probes.
+//! A *start* is one of the parameter values at which a fit of the effect begins. The effect's other
+//! parameters have the values of the start from which it is detected most easily. Each alternative
+//! is probed at up to two of its starts. The power law holds only near the probe, because an effect
+//! may have a kink. Therefore, if a limit is far from its probe, the effect is probed again at the
+//! limit, and p is computed from the last two probes.
 
 mod draws;
 mod lags;
@@ -43,15 +46,17 @@ use crate::{
     search::selection::Looked,
 };
 
-/// Bisection steps once a limit is bracketed within a ratio: they determine it to 1 %.
+/// Number of bisection steps after a limit is bracketed within the ratio [`STEP`]. They determine
+/// it to 1 %.
 const HALVINGS: usize = 6;
 /// Strengths below this share of the range are not tried.
 const LEAST: f64 = 1e-6;
-/// Share of the range within which a limit is searched, and the ratio of successive strengths that
-/// are tried to bracket it.
+/// A limit is searched up to the share [`INSIDE`] of the range. To bracket it, strengths are tried
+/// in ratios of [`STEP`].
 const INSIDE: f64 = 0.99;
 const STEP: f64 = 1.5;
-/// Ratio of a limit to its probe beyond which it is probed again, and how often at most.
+/// If the ratio of a limit to its probe exceeds [`FAR`], the effect is probed again, at most
+/// [`ROUNDS`] times.
 const FAR: f64 = 1.4;
 const ROUNDS: usize = 4;
 
@@ -81,21 +86,21 @@ pub struct DetectionLimit {
     pub others: BTreeMap<String, f64>,
 }
 
-/// Inputs of detection limits: the problem, the best set, whose residual is taken for noise, and
-/// the rule.
+/// Inputs of the computation of detection limits. The residual of the best set is taken for noise,
+/// and the thresholds define the rule by which effects are named.
 #[derive(Clone, Copy)]
 pub(crate) struct LimitInputs<'a> {
     pub(crate) problem: &'a PreparedProblem<'a>,
     pub(crate) best: &'a Hypothesis,
     pub(crate) thresholds: &'a Thresholds,
-    /// Excess that noise alone stays below in 19 of 20 records.
+    /// Excess below which noise alone stays in 19 of 20 recordings.
     pub(crate) null_band: f64,
     pub(crate) seed: u64,
 }
 
-/// The detection limit of every effect of the catalogue, in its order, except effects whose course
-/// in time is estimated from the recording, because these have no strength. `looked` is a screen
-/// around the re-tuned nominal simulator, if there is one.
+/// Returns the detection limit of every effect, in the order of the catalogue. Effects whose course
+/// in time is estimated from the recording have no strength and are left out. `looked` holds the
+/// results of a screening around the re-tuned nominal simulator, if there was one.
 pub(crate) fn detection_limits(
     inputs: LimitInputs<'_>,
     looked: Option<&Looked>,
@@ -106,8 +111,8 @@ pub(crate) fn detection_limits(
         sizes.into_iter().enumerate().map(|(e, own)| easiest(problem, e, own, inputs)).collect();
     let mut probes = Probes::of(problem, inputs.best, &starts)?;
     let mut found = limits(inputs, &probes)?;
-    // A limit far from its probe is probed again at its own strength. If runs are costly, the
-    // linearisation has to suffice.
+    // If a limit is far from its probe, the effect is probed again at the strength of the limit. If
+    // runs are costly, the first probe has to suffice.
     let rounds = if problem.simulator().model_runs().is_none() { ROUNDS } else { 0 };
     for _ in 0..rounds {
         let moved = probes.moved(problem, &found, FAR)?;
@@ -138,7 +143,7 @@ pub(crate) fn detection_limits(
     Ok(effects.map(limit).collect())
 }
 
-/// The limit of every effect around its probe.
+/// Returns the limit of every effect, computed from its probe.
 fn limits(inputs: LimitInputs<'_>, probes: &Probes) -> Result<Vec<Option<f64>>, GapError> {
     let count = inputs.problem.simulator().effects().len();
     (0..count).into_par_iter().map(|effect| limit(inputs, probes, effect)).collect()
@@ -153,7 +158,8 @@ fn limit(inputs: LimitInputs<'_>, probes: &Probes, effect: usize) -> Result<Opti
     }
     let record = Record::of(inputs, probes, own);
     let probe = &probes.all[own];
-    // At the very end of its range, an effect is more likely to compensate for something else.
+    // Stop short of the end of the range: the posterior takes an effect there for a compensation of
+    // something else.
     let end = INSIDE * probe.reach;
     let (mut low, mut high) = (0.0, probe.distance.abs().min(end));
     while !record.names(probe.amplitude(high)) {

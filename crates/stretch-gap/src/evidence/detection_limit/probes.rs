@@ -1,5 +1,5 @@
-//! Probes: the change of the output by each effect at a strength near its detection limit, with the
-//! nominal parameters projected out.
+//! Computes probes: the change of the output by each effect at a strength near its detection limit,
+//! without the part for which the nominal parameters can compensate (they are projected out).
 
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -20,8 +20,8 @@ use crate::{
     search::{screen::Ground, selection::Looked},
 };
 
-/// Number of starts per effect that are probed: the one that is easiest to detect, and another at
-/// which the effect may resemble a different effect.
+/// Number of starts (parameter values at which fits begin) that are probed per effect: the one at
+/// which the effect is easiest to detect, and another at which it may resemble a different effect.
 const STARTS: usize = 2;
 /// Smallest and largest exponent of the strength that is estimated from two probes.
 const POWERS: [f64; 2] = [0.5, 60.0];
@@ -32,7 +32,7 @@ pub(super) struct Start {
     pub(super) values: Vec<f64>,
     /// Index of the parameter that is the strength of the effect.
     pub(super) main: usize,
-    /// Exponent with which the squared change grows with the strength.
+    /// Exponent p of the power law: the squared change is proportional to strength^p.
     power: f64,
 }
 
@@ -40,8 +40,8 @@ pub(super) struct Start {
 pub(super) struct Probe {
     pub(super) effect: usize,
     pub(super) start: Start,
-    /// Signed distance of the strength from the value at which the effect is off, and the largest
-    /// distance within its range on the same side.
+    /// `distance` is the signed distance of the strength from the value at which the effect is off
+    /// (`off`). `reach` is the largest distance within the range of the strength on the same side.
     pub(super) distance: f64,
     pub(super) reach: f64,
     off: f64,
@@ -62,8 +62,8 @@ pub(super) struct Change {
 }
 
 impl Probe {
-    /// Returns the change as a multiple of the probe's change, at a distance of the strength from
-    /// where the effect is off.
+    /// Returns the size of the change as a multiple of the probe's change, if the strength is at
+    /// this distance from the value at which the effect is off.
     pub(super) fn amplitude(&self, distance: f64) -> f64 {
         (distance / self.distance.abs()).powf(0.5 * self.start.power)
     }
@@ -74,14 +74,14 @@ impl Probe {
         self.changes.iter().map(one).sum()
     }
 
-    /// Returns the strength at a distance from where the effect is off.
+    /// Returns the strength at this distance from the value at which the effect is off.
     pub(super) fn strength(&self, distance: f64) -> f64 {
         self.off + distance * self.distance.signum()
     }
 }
 
-/// Estimates the exponent with which the squared change grows with the strength, from two squared
-/// changes and the ratio of their strengths.
+/// Estimates the exponent p of the power law from two squared changes and the ratio of their
+/// strengths.
 fn power_of(size: f64, other: f64, ratio: f64) -> f64 {
     let power = (other / size).ln() / ratio.abs().ln();
     if power.is_finite() { power.clamp(POWERS[0], POWERS[1]) } else { 2.0 }
@@ -109,8 +109,8 @@ pub(super) fn sizes(
     effects.par_iter().enumerate().map(size).collect()
 }
 
-/// Returns the index of the main parameter of a start, the first strength that is not off, and its
-/// distance from where it is off.
+/// Returns the index of the main parameter of a start, and its distance from the value at which the
+/// effect is off. The main parameter is the first strength that is not off.
 fn main_of(spec: &EffectSpec, values: &[f64]) -> Option<(usize, f64)> {
     let mut strengths = spec.parameters.iter().zip(values).enumerate();
     strengths.find_map(|(i, (p, value))| {
@@ -119,9 +119,10 @@ fn main_of(spec: &EffectSpec, values: &[f64]) -> Option<(usize, f64)> {
     })
 }
 
-/// Returns the starts of an effect at which it changes the output, one for each combination of its
-/// other parameters, the easiest to detect first, at most `STARTS`. Unless runs are costly, each
-/// is moved to the strength at which the effect may be detected. `sizes` are those of [`sizes`].
+/// Returns at most `STARTS` starts of an effect at which it changes the output, the one that is
+/// easiest to detect first. Starts that differ only in the strength count as one. Unless runs are
+/// costly, the strength of each start is moved to where the effect is about to be detected. `sizes`
+/// is the effect's entry in the result of [`sizes`].
 pub(super) fn easiest(
     problem: &PreparedProblem<'_>,
     effect: usize,
@@ -129,8 +130,8 @@ pub(super) fn easiest(
     inputs: LimitInputs<'_>,
 ) -> Vec<Start> {
     let spec = &problem.simulator().effects()[effect];
-    // Squared change of the smallest gap that counts. If the size of the gap alone decides, the
-    // limit is there.
+    // Squared change that makes the smallest gap that counts. If only the size of the gap decides,
+    // this is the detection limit.
     let target = inputs.thresholds.least_gap * problem.compare.roles.count(Role::Fit) as f64;
     let is_costly = problem.simulator().model_runs().is_some();
     let mut known: Vec<(usize, f64, f64, &Vec<f64>)> = Vec::new();
@@ -148,17 +149,18 @@ pub(super) fn easiest(
         };
         let parameter = &spec.parameters[main];
         let off = parameter.off().unwrap_or(0.0);
-        // Probe only positive values of a strength of either sign; the fit can flip the sign.
+        // If a strength can have either sign, probe only positive values; the fit can change the
+        // sign.
         if distance < 0.0 && off == 0.0 && parameter.max > 0.0 {
             continue;
         }
-        // Of starts that differ only in the strength, keep the one whose change is nearest to the
-        // target.
+        // Of the starts that differ only in the strength, keep the one whose squared change is
+        // nearest to the target.
         let near = |size: f64| (size / target).ln().abs();
         if known.iter().filter(alike).any(|k| near(k.2) < near(size)) {
             continue;
         }
-        // Below the weakest start, the change is usually linear.
+        // At strengths below that of the weakest start, the change is usually linear.
         let weakest = known.iter().filter(alike).all(|k| k.1.abs() >= distance.abs());
         let other = known.iter().filter(alike).find(|k| k.1 != distance);
         let other = other.filter(|_| off != 0.0 || !weakest || size < target);
@@ -169,8 +171,8 @@ pub(super) fn easiest(
         if !is_costly && moved != off {
             start.values[main] = moved;
         }
-        // An effect of an unusual form may act although its strength is off, so such starts come
-        // last.
+        // An effect of an unusual form may act although its strength is off, so starts with an
+        // unusual form come last.
         let forms = spec.parameters.iter().zip(values);
         let is_odd =
             forms.into_iter().any(|(p, v)| p.usual_form().is_some_and(|usual| usual != *v));
@@ -185,7 +187,7 @@ pub(super) struct Probes {
     pub(super) all: Vec<Probe>,
     trials: usize,
     stages: Vec<TunedStage>,
-    /// By stage: autocorrelation sums of the residual that is taken for noise.
+    /// By stage: autocorrelation sums of the best set's residual, which is taken for noise.
     noise_lags: Vec<Lags>,
 }
 
@@ -229,7 +231,7 @@ impl Probes {
         roles.of_role(Role::Test).all(|s| s.to <= end)
     }
 
-    /// Returns the autocorrelation sums of the residual of a stage that is taken for noise.
+    /// Returns the autocorrelation sums of a stage's residual, which is taken for noise.
     pub(super) fn noise_lags(&self, stage: usize) -> &Lags {
         &self.noise_lags[stage]
     }
@@ -239,8 +241,8 @@ impl Probes {
         self.all.iter().position(|p| p.effect == effect)
     }
 
-    /// Probes those effects again whose limit differs from their probe by more than the ratio
-    /// `far`. Returns these effects.
+    /// Probes an effect again if the ratio of its limit to the strength of its probe exceeds `far`
+    /// in either direction. Returns the effects that were probed again.
     pub(super) fn moved(
         &mut self,
         problem: &PreparedProblem<'_>,
@@ -304,7 +306,8 @@ impl Probes {
         Ok(begun.into_par_iter().filter_map(probe).collect())
     }
 
-    /// A probe from its outputs in the stages that it touches; `None` if nothing changes.
+    /// Returns a probe, given its simulated outputs in the stages in which the effect acts; `None`
+    /// if the outputs do not change.
     fn probe(
         &self,
         problem: &PreparedProblem<'_>,
@@ -321,7 +324,8 @@ impl Probes {
         let distance = start.values[start.main] - off;
         let reach = if distance > 0.0 { parameter.max - off } else { off - parameter.min };
         let most = (reach / distance.abs()).powf(0.5 * start.power);
-        // A fit may flip the sign of a strength of either sign; a threshold has only one side.
+        // If a strength can have either sign, a fit may change the sign; a threshold has only one
+        // side.
         let back = if distance > 0.0 { off - parameter.min } else { parameter.max - off };
         let least = if off == 0.0 && back > 0.0 { -back / distance.abs() } else { 0.0 };
         let range = [least, most];
@@ -330,7 +334,7 @@ impl Probes {
         (probe.size(problem) > 0.0).then_some(probe)
     }
 
-    /// The change of one stage, the nominal parameters projected out.
+    /// Returns the change of one stage's output, with the nominal parameters projected out.
     fn projected(&self, problem: &PreparedProblem<'_>, stage: usize, there: Vec<f64>) -> Change {
         let (compare, tuned) = (&problem.compare, &self.stages[stage]);
         let metric = &compare.metrics[stage];
@@ -347,7 +351,8 @@ impl Probes {
     }
 }
 
-/// One stage of the re-tuned nominal: its output, the sensitivities of its parameters, and the factor of their normal matrix with the prior.
+/// One stage of the re-tuned nominal simulator: its output, the sensitivities to its parameters,
+/// and the Cholesky factor of their normal matrix, which includes the prior.
 struct TunedStage {
     output: Vec<f64>,
     sensitivities: Vec<Column>,
@@ -388,7 +393,7 @@ impl TunedStage {
                     sensitivities.push(compare.metrics[stage].column(&compare.roles, change));
                 }
                 Err(error) if error.ends_all() => return Err(error),
-                // If a value cannot be simulated, a fit does not reach it either.
+                // If this parameter value cannot be simulated, a fit does not reach it either.
                 Err(_) => {}
             }
         }

@@ -1,8 +1,10 @@
-//! Assigns every sample to a slice.
+//! Assigns every sample to a slice, along several axes: regime, level and rate of the motion, time,
+//! travel, and trial.
 //!
-//! Level and rate come from the measured motion by a straight line over 21 samples. The slope has
-//! the standard deviation sigma/(dt sqrt(2 sum_1^10 k^2)) for noise sigma of one sample; motion
-//! slower than four of these is rest.
+//! Level and rate are those of a straight line fitted to 21 samples of the measured motion. If one
+//! sample has the noise sigma, the slope has the standard deviation sigma/(dt sqrt(2 sum_1^10
+//! k^2)). The motion is at rest if its rate is below four of these standard deviations, or below 2
+//! % of the fastest rate.
 
 use stretch_filter::log::second_differences;
 
@@ -14,21 +16,22 @@ use crate::problem::{record_facts::Motion, sample_roles::SampleRoles, simulator:
 const REACH: usize = 10;
 /// Time around a reversal that counts as turnaround, s.
 const TURN_S: f64 = 0.15;
-/// A dwell shorter than this inside a reversal belongs to it, s.
+/// A dwell between two directions that is shorter than this belongs to the reversal, s.
 const SHORT_DWELL_S: f64 = 0.3;
-/// Least share of the fastest rate that counts as motion.
+/// Smallest rate that counts as motion, as a share of the fastest.
 const MOVING: f64 = 0.02;
-/// Ends of the slices of time in a trial, s.
+/// Boundaries of the slices of time in a trial, s.
 const TIMES_S: [f64; 6] = [1.0, 3.0, 7.0, 15.0, 30.0, 60.0];
 
-/// One division of the samples; samples outside all slices hold [`Axis::NONE`].
+/// One division of the samples into slices; samples outside all slices have the index
+/// [`Axis::NONE`].
 pub(super) struct Axis {
     pub(super) by: &'static str,
     pub(super) labels: Vec<String>,
     pub(super) of: Vec<u16>,
 }
 
-/// The motion by which samples are divided.
+/// The measured motion, by which samples are divided.
 pub(super) struct Course {
     level: Vec<f64>,
     rate: Vec<f64>,
@@ -83,7 +86,7 @@ impl Course {
         self.level.len()
     }
 
-    /// -1, 0, 1: falls, rests, rises.
+    /// Returns -1 if the motion falls, 0 if it rests, 1 if it rises.
     fn sense(&self, i: usize) -> i8 {
         match self.rate[i] {
             r if r > self.still => 1,
@@ -92,7 +95,7 @@ impl Course {
         }
     }
 
-    /// Samples where the motion turns round.
+    /// Returns the samples at which the motion reverses.
     fn reversals(&self, dt_s: f64) -> Vec<usize> {
         let mut found = Vec::new();
         for trial in self.starts.windows(2) {
@@ -164,7 +167,7 @@ impl Axis {
         Self::even("level", &course.level, low, high, 5, short, unit)
     }
 
-    /// Quarters of the moving samples, by the size of their rate.
+    /// Divides the moving samples into quarters by the size of their rate.
     fn rate(course: &Course, unit: &str) -> Self {
         let mut sizes: Vec<f64> =
             course.rate.iter().map(|r| r.abs()).filter(|r| *r > course.still).collect();
@@ -185,7 +188,7 @@ impl Axis {
         Self { by: "rate", labels, of }
     }
 
-    /// Time in the trial, time in the session, and distance travelled.
+    /// Divides by time in the trial, by time in the session, and by distance travelled.
     fn clocks(course: &Course, simulator: &dyn Simulator) -> [Self; 3] {
         let dt_s = simulator.dt_s();
         let mut time = Vec::with_capacity(course.len());
@@ -254,7 +257,8 @@ fn short(x: f64) -> String {
     format!("{x:.*}", (2 - digits).clamp(0, 6) as usize)
 }
 
-/// Value and slope at `at` of the straight line through evenly spaced samples.
+/// Returns value and slope, at the sample `at`, of the straight line fitted to evenly spaced
+/// samples.
 fn line(samples: &[f64], at: usize, dt_s: f64) -> (f64, f64) {
     let n = samples.len() as f64;
     let middle = 0.5 * (n - 1.0);
@@ -269,7 +273,7 @@ fn line(samples: &[f64], at: usize, dt_s: f64) -> (f64, f64) {
     (mean + slope * (at as f64 - middle), slope / dt_s)
 }
 
-/// Noise of a record from the median of its second differences.
+/// Estimates the noise of a recording from the median of its second differences.
 fn noise(values: &[f64]) -> f64 {
     let mut sizes: Vec<f64> = second_differences(values).map(f64::abs).collect();
     sizes.sort_by(f64::total_cmp);
@@ -305,7 +309,7 @@ mod tests {
         assert_relative_eq!(noise(&values), 0.2, max_relative = MEDIAN_SPREAD, epsilon = 0.0);
     }
 
-    /// A noise-free course at 100 Hz with these rates per second, from 0.
+    /// Returns a noise-free motion at 100 Hz that begins at 0 and has these rates per second.
     fn course(rate: Vec<f64>) -> Course {
         let mut at = 0.0;
         let level = rate
@@ -329,7 +333,8 @@ mod tests {
     #[test]
     fn a_reversal_lies_where_the_motion_turns() {
         let triangle = course([vec![1.0; 100], vec![-1.0; 100], vec![1.0; 50]].concat());
-        // Half-way between the last sample before and the first sample after the turn.
+        // The reversal is half-way between the last sample before and the first sample after the
+        // turn.
         assert_eq!(triangle.reversals(0.01), [99, 199]);
         assert!(course(vec![1.0; 100]).reversals(0.01).is_empty());
         assert!(course(vec![0.0; 100]).reversals(0.01).is_empty());
@@ -364,7 +369,7 @@ mod tests {
         assert_eq!(axis.labels.len(), 4);
         for quarter in 0..4_u16 {
             let count = axis.of.iter().filter(|of| **of == quarter).count();
-            // An end belongs to one of its two neighbours.
+            // A sample on a boundary may belong to either quarter.
             assert!((99..=101).contains(&count), "{quarter}: {count}");
         }
         assert!(axis.of[400..].iter().all(|of| *of == Axis::NONE));
@@ -384,7 +389,7 @@ mod tests {
         );
         let count = |slice: u16| axis.of.iter().filter(|of| **of == slice).count();
         assert_eq!([0, 1, 2, 3, 4].map(count), [20, 20, 20, 20, 21]);
-        // Values outside the range go to the nearest slice; an empty or invalid range is not
+        // Values outside the range belong to the nearest slice; an empty or invalid range is not
         // divided.
         let out = Axis::even("level", &[-5.0, 50.0], 0.0, 10.0, 5, short, "");
         assert_eq!(out.of, [0, 4]);

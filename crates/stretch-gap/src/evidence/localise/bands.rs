@@ -1,18 +1,19 @@
-//! The residual by octaves of frequency.
+//! Divides a residual by octaves of frequency.
 
 use std::f64::consts::TAU;
 
 use super::excess::Cells;
 use crate::problem::sample_roles::SampleRoles;
 
-/// Samples of a window; neighbours overlap by half.
+/// Number of samples in a window; neighbouring windows overlap by half.
 const WINDOW: usize = 512;
-/// Octaves counted down from half the sample rate; the last holds all lower frequencies.
+/// Number of octaves, counted down from half the sample rate; the last band holds all lower
+/// frequencies.
 const BANDS: usize = 8;
 
 /// Computes the power in octave bands by window (Welch's method with Hann's window), scaled such
-/// that white noise of variance 1 has power 1 in every line. Segments shorter than a window are
-/// left out.
+/// that white noise of variance 1 has power 1 in every line. Segments of the recording that are
+/// shorter than a window are left out.
 pub(super) fn cells(roles: &SampleRoles, residual: &[f64], dt_s: f64) -> (Vec<String>, Cells) {
     let window: Vec<f64> =
         (0..WINDOW).map(|i| 0.5 - 0.5 * (TAU * i as f64 / WINDOW as f64).cos()).collect();
@@ -42,7 +43,7 @@ pub(super) fn cells(roles: &SampleRoles, residual: &[f64], dt_s: f64) -> (Vec<St
     }
     let hertz = |band: usize| {
         let f = 0.5 / dt_s / (1 << band) as f64;
-        // one decimal; below 0.1 Hz, down to the first digit that is not zero
+        // Print one decimal; below 0.1 Hz, print up to the first digit that is not zero.
         let places = (-f.log10().floor()).clamp(1.0, 9.0) as usize;
         let text = format!("{f:.places$}");
         text.trim_end_matches('0').trim_end_matches('.').to_owned()
@@ -56,7 +57,8 @@ pub(super) fn cells(roles: &SampleRoles, residual: &[f64], dt_s: f64) -> (Vec<St
     (labels, Cells::new(BANDS, cells))
 }
 
-/// Band of a spectral line, the highest first.
+/// Returns the index of the band to which a spectral line belongs; band 0 has the highest
+/// frequencies.
 fn band(line: usize) -> usize {
     (1..BANDS).take_while(|b| line <= (WINDOW / 2) >> b).count()
 }
@@ -112,7 +114,7 @@ mod tests {
                 c += x * angle.cos();
                 s += x * angle.sin();
             }
-            // The largest of 32 lines of noise is some 10.
+            // The largest of 32 lines of noise is about 10.
             assert_abs_diff_eq!(*re, c, epsilon = LOCAL_VALUE);
             assert_abs_diff_eq!(*im, s, epsilon = LOCAL_VALUE);
         }
@@ -130,7 +132,7 @@ mod tests {
         SampleRoles { segments, block: 50, fit_trials: 1, borrowed_test: true }
     }
 
-    /// Excess by band over a residual at 100 Hz.
+    /// Returns the excess by band of a residual at 100 Hz.
     fn excesses(residual: &[f64]) -> Vec<f64> {
         let (_, cells) = cells(&whole(residual.len()), residual, 0.01);
         cells.sliced(1, 0).iter().map(|s| s.excess).collect()
@@ -148,8 +150,8 @@ mod tests {
     }
 
     /// Octaves count down from half of 100 Hz. A tone in the middle of an octave has almost all of
-    /// its power there: the power of Hann's window is down to 1e-3 two lines away, and falls with
-    /// the sixth power.
+    /// its power there: two spectral lines away, the power of Hann's window has fallen to 1e-3, and
+    /// it falls with the sixth power of the distance.
     #[test]
     fn a_tone_is_in_its_octave() {
         for band in 0..BANDS - 1 {
@@ -160,8 +162,8 @@ mod tests {
             let lines = |b: usize| if b + 1 == BANDS { 3.0 } else { f64::from(128 >> b) };
             let all: f64 = power.iter().enumerate().map(|(b, p)| p * lines(b)).sum();
             let own = power[band] * lines(band) / all;
-            // The narrowest octave has two lines, and a third of the window's width extends over
-            // its edges.
+            // The narrowest octave has two spectral lines, and a third of the power of the window
+            // lies beyond its edges.
             let least = if band < BANDS - 3 { 0.99 } else { 0.6 };
             assert!(own > least, "{hertz} Hz: {own} of {power:?}");
         }
@@ -169,7 +171,7 @@ mod tests {
 
     /// Noise of variance 1 has power 1 in every octave. The lowest band has 3 lines in each of 127
     /// windows that overlap by half. These are some 200 independent powers, whose mean is known to
-    /// 0.07. The tolerance is three of these; wider bands are known better.
+    /// 0.07. The tolerance is three times 0.07; the means of wider bands are known better.
     #[test]
     fn white_noise_has_the_same_power_in_every_octave() {
         let mut random = crate::numerics::random::RandomGenerator::new(11, 2);

@@ -1,14 +1,17 @@
-//! Once there is a named cause, a gap is located at the place of its cause.
+//! Locates the gap at its cause, if there are named effects.
 //!
-//! A non-linear potentiometer also shows in the voltage, because the gauge is driven by the
-//! potentiometer's length. Therefore what a named effect closes belongs to the stage of the effect,
-//! and what is left belongs to the stage that leaves it:
+//! The stage in which a gap shows need not be the stage of its cause. For example, a non-linear
+//! potentiometer also shows in the voltage of the gauge, because the simulated gauge is driven by
+//! the length that the potentiometer measures. Therefore the part of the gap that a named effect
+//! closes belongs to the stage of the effect, and the part that is left belongs to the stage that
+//! leaves it:
 //!
 //! ```text
 //! share_s = (sum of what named effects of s close + max(0, e_s left)/e)/sum of the same over all stages
 //! ```
 //!
-//! with the gap e of the re-tuned nominal.
+//! with the gap e of the re-tuned nominal simulator, and the excess e_s left that remains in stage
+//! s.
 
 use crate::{
     evidence::{localise::location::StageGap, shares::EffectShare},
@@ -18,7 +21,8 @@ use crate::{
 /// Name of the stage in which lengths are measured. No simulator has this stage.
 const REFERENCE: &str = "reference";
 
-/// Returns the stages with their shares of the gap by cause; unchanged if no effect is named.
+/// Returns the stages with their shares of the gap by cause. The shares are unchanged if no effect
+/// is named.
 pub(crate) fn with_causes(
     mut stages: Vec<StageGap>,
     shares: &[EffectShare],
@@ -46,14 +50,15 @@ pub(crate) fn with_causes(
     stages
 }
 
-/// Index of the stage that an effect belongs to. A stage that the simulator lacks is added after
-/// its own stages.
+/// Returns the index of the stage to which an effect belongs. If the simulator lacks this stage, it
+/// is appended to `stages`.
 fn place(stages: &mut Vec<StageGap>, spec: &EffectSpec) -> Option<usize> {
     let shows = *spec.touches.first()?;
     let is_own = spec.stage == REFERENCE;
     match stages.iter().position(|s| s.stage == spec.stage) {
         Some(stage) => Some(stage),
-        // Part of a stage that is simulated as a whole: the pneumatics of the actuation.
+        // The effect belongs to a part of a stage that is simulated as a whole, such as the
+        // pneumatics of the actuation.
         None if !is_own => Some(shows),
         None => {
             let own = StageGap {
@@ -108,10 +113,10 @@ mod tests {
         let shares = [share(&names[1], 0.7), share(&names[0], 0.2)];
         let told = with_causes(before.to_vec(), &shares, &names, simulator);
         let found: Vec<f64> = told.iter().map(|s| s.share).collect();
-        // 0.2 of the first and 0.7 of the second effect, 0.1 left in the second stage.
+        // The first effect closes 0.2, the second 0.7, and 0.1 is left in the second stage.
         approx::assert_abs_diff_eq!(found[0], 0.2, epsilon = 1e-12);
         approx::assert_abs_diff_eq!(found[1], 0.8, epsilon = 1e-12);
-        // Without a name the shares are those of the channels.
+        // If no effect is named, the shares are those of the channels.
         assert_eq!(with_causes(before.to_vec(), &shares, &[], simulator), before);
     }
 
@@ -124,7 +129,7 @@ mod tests {
         };
         assert_eq!(place(&mut stages, &pot), Some(2));
         assert_eq!((stages[2].stage.as_str(), stages[2].is_cause_only), (REFERENCE, true));
-        // The second time, the stage exists already.
+        // The stage was added by the first call, so this call adds none.
         assert_eq!((place(&mut stages, &pot), stages.len()), (Some(2), 3));
         let valve = EffectSpec::new("leak", (0, "pneumatics"), Vec::new());
         assert_eq!(place(&mut stages, &valve), Some(0));

@@ -1,14 +1,16 @@
 //! Runs the stages in a chain to find which of them cause the gap of the last output.
 //!
-//! Errors of a stage pass through the following ones, so shares depend on the order in which stages
-//! are corrected. The Shapley value (1953, doi 10.1515/9781400881970-018) averages over all orders,
+//! Errors of a stage pass through the following stages, so the share of a stage depends on the
+//! order in which stages are corrected. The Shapley value phi_s (1953, doi
+//! 10.1515/9781400881970-018) of stage s is the average over all orders of the n stages:
 //!
 //! ```text
 //! phi_s = sum over sets T without s of |T|! (n - |T| - 1)!/n! (gap(T + s) - gap(T))
 //! ```
 //!
-//! where gap(T) is the mean square error of the last output with the stages of T simulated and the
-//! others corrected by their errors on their measured input.
+//! gap(T) is the mean square error of the last output if the stages in T are simulated and the
+//! others are corrected: from the output of a corrected stage, the error that this stage makes on
+//! its measured input is subtracted.
 
 use crate::{
     evidence::gathered::Evidence,
@@ -17,14 +19,15 @@ use crate::{
 
 /// One variant of the output that a stage passes to the next.
 struct Variant {
-    /// Stages that are simulated, one bit each; the others are corrected.
+    /// Stages that are simulated, one bit per stage; the others are corrected.
     simulated: usize,
     /// Values; `None` if they are the measured ones.
     output: Option<Vec<f64>>,
 }
 
-/// Returns the share of every stage. Empty unless there are two to six stages, if a stage cannot be
-/// run on another's output, or if the gap is at most a tenth of the noise's variance.
+/// Returns the share of every stage. The result is empty if there are fewer than two or more than
+/// six stages, if a stage cannot be run on the output of another, or if the gap is at most a tenth
+/// of the noise's variance.
 pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, GapError> {
     let simulator = runs.simulator();
     let stages = simulator.stages().len();
@@ -36,7 +39,8 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
     let mut variants = vec![Variant { simulated: 0, output: None }];
     for stage in 0..stages {
         let alone = &evidence.stages[stage].retuned;
-        // Base of a correction: the measurement as it is fed to the next stage.
+        // A corrected output starts from the measurement in the form in which it is fed to the next
+        // stage.
         let base = match stage + 1 {
             next if next == stages => Some(simulator.measured(stage).to_vec()),
             next => simulator.input(next),
@@ -74,7 +78,7 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
             }
             count += segment.to - segment.from;
         }
-        // A corrected last stage leaves no noise.
+        // If the last stage is corrected, its output equals the measurement including its noise.
         let noise = if variant.simulated >> last & 1 == 1 { sd * sd } else { 0.0 };
         gaps[variant.simulated] = sum / count.max(1) as f64 - noise;
     }
@@ -84,8 +88,8 @@ pub(super) fn shapley(runs: &Runs<'_>, evidence: &Evidence) -> Result<Vec<f64>, 
     Ok(shares(&gaps, stages))
 }
 
-/// Returns the Shapley values (1953) of a game as shares of their sum, negative ones as 0.
-/// `value_of` holds the value of every set of players.
+/// Returns the Shapley values of a game as shares of their sum; negative values count as 0.
+/// `value_of` holds the value of every set of players, one bit per player.
 fn shares(value_of: &[f64], players: usize) -> Vec<f64> {
     let factorial = |n: usize| (1..=n).map(|i| i as f64).product::<f64>();
     let mut values = vec![0.0; players];
@@ -108,7 +112,8 @@ mod tests {
 
     #[test]
     fn shares_are_those_of_the_glove_game() {
-        // Two left gloves and one right: 1/6, 1/6, 4/6 (any textbook).
+        // The glove game of the textbooks: two players hold a left glove and one a right glove. A
+        // pair is worth 1. The Shapley values are 1/6, 1/6 and 4/6.
         let pairs = |set: usize| if set & 4 != 0 && set & 3 != 0 { 1.0 } else { 0.0 };
         let value_of: Vec<f64> = (0..8).map(pairs).collect();
         let shares = shares(&value_of, 3);
@@ -117,25 +122,26 @@ mod tests {
         }
     }
 
-    /// The value of every set of three players, by a rule on its members.
+    /// Returns the value of every set of three players. `worth` computes it from who is a member.
     fn game(worth: impl Fn([bool; 3]) -> f64) -> Vec<f64> {
         (0..8).map(|set: usize| worth([set & 1 != 0, set & 2 != 0, set & 4 != 0])).collect()
     }
 
     #[test]
     fn shares_sum_to_the_whole_and_a_stage_without_gap_has_none() {
-        // The errors of two stages add up before they are squared, the third makes none.
+        // The errors of two stages add up before they are squared; the third stage makes no error.
         let worth =
             game(|[a, b, _]| (2.0 * f64::from(u8::from(a)) + f64::from(u8::from(b))).powi(2));
         let found = shares(&worth, 3);
-        // Orders a b and b a: 4 and 5, 8 and 1; means 6 and 3 of 9.
+        // The total is 9. In the order a, b, the stages add 4 and 5; in the order b, a, stage a
+        // adds 8 and stage b 1. The means are 6 for a and 3 for b.
         for (share, expected) in found.iter().zip([6.0 / 9.0, 3.0 / 9.0, 0.0]) {
             assert_relative_eq!(*share, expected, max_relative = F64_ROUNDING, epsilon = 0.0);
         }
         assert_relative_eq!(found.iter().sum::<f64>(), 1.0, max_relative = F64_ROUNDING);
     }
 
-    /// If errors are independent, every stage has the share that it makes alone.
+    /// If errors are independent, every stage has the share that it causes alone.
     #[test]
     fn independent_errors_are_shared_as_they_are() {
         let alone = [5.0, 0.25, 2.0];
@@ -157,7 +163,7 @@ mod tests {
             let own = shares(&worth, 3);
             assert_relative_eq!(own.iter().sum::<f64>(), 1.0, max_relative = F64_ROUNDING);
             let scaled: Vec<f64> = worth.iter().map(|w| 1e6 * w).collect();
-            // Exchanges the first and the last stage: bits 0 and 2 of every set.
+            // Exchanges the first and the last stage, which are bits 0 and 2 of every set.
             let swap = |set: usize| set & 2 | (set & 1) << 2 | set >> 2;
             let swapped: Vec<f64> = (0..8).map(|set| worth[swap(set)]).collect();
             let (scaled, swapped) = (shares(&scaled, 3), shares(&swapped, 3));

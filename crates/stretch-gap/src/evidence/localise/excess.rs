@@ -1,4 +1,5 @@
-//! Excess of slices, with intervals by block bootstrap, and the false-discovery correction.
+//! Computes the excess (reduced chi-square minus one) of slices, with intervals by block bootstrap
+//! and p-values, and corrects for false discoveries.
 
 use super::axes::Axis;
 use crate::{
@@ -7,9 +8,9 @@ use crate::{
 
 /// False-discovery rate that is allowed among the reported slices.
 const FALSE_DISCOVERIES: f64 = 0.05;
-/// Draws of the bootstrap.
+/// Number of draws of the bootstrap.
 const DRAWS: usize = 200;
-/// Blocks that a slice needs before it can be reported.
+/// Smallest number of blocks with samples of a slice for which the slice has a p-value below 1.
 const LEAST_BLOCKS: usize = 6;
 
 /// Sums of squares and counts by block and slice.
@@ -108,8 +109,9 @@ impl Cells {
         sums
     }
 
-    /// Probability that a slice like the rest is this much worse, by the linearised variance of a
-    /// ratio of block sums.
+    /// Returns the p-value of a slice: the probability that its mean square exceeds that of the
+    /// rest of the stage by as much, if both have the same expectation. The variance is that of a
+    /// linearised ratio of block sums.
     fn p_value(&self, slice: usize, own: (f64, f64), whole: (f64, f64)) -> f64 {
         let rest = (whole.0 - own.0, whole.1 - own.1);
         if rest.1 <= 0.0 {
@@ -132,7 +134,7 @@ impl Cells {
     }
 }
 
-/// The hypotheses that are rejected at the allowed false-discovery rate.
+/// Returns, for each p-value, whether it is a discovery at the allowed false-discovery rate.
 pub(super) fn discoveries(p: &[f64]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|a, b| p[*a].total_cmp(&p[*b]));
@@ -152,7 +154,8 @@ mod tests {
 
     #[test]
     fn benjamini_and_hochberg_as_in_their_paper() {
-        // The fifteen p-values of their section 3.2: four rejections at 0.05.
+        // The fifteen p-values of section 3.2 of Benjamini and Hochberg (1995), with four
+        // rejections at 0.05.
         let p = [
             0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240, 0.4262,
             0.5719, 0.6528, 0.7590, 1.0,
@@ -181,7 +184,8 @@ mod tests {
         assert_eq!(cells.sliced(1, 0), sliced);
     }
 
-    /// Cells of `blocks` blocks of 25 samples in each slice, with the given standard deviations.
+    /// Returns random cells: `blocks` blocks with 25 samples of each slice. `sds` holds the
+    /// standard deviation of each slice.
     fn drawn(sds: &[f64], blocks: usize, random: &mut RandomGenerator) -> Cells {
         let mut cells = Vec::new();
         for _ in 0..blocks {
@@ -198,16 +202,16 @@ mod tests {
         let sum: f64 = sliced.iter().map(|s| s.share).sum();
         approx::assert_relative_eq!(sum, 1.0, max_relative = testkit::tolerance::F64_ROUNDING);
         assert_eq!((sliced[1].share, sliced[1].excess < 0.0), (0.0, true));
-        // Gaps of 1.25 and 8; sums of 1500 squares are known to 4 %, the ratio to 6 %: three of
-        // these.
+        // The gaps are 1.25 and 8. Sums of 1500 squares are known to 4 % and their ratio to 6 %;
+        // the tolerance is three times that.
         approx::assert_relative_eq!(sliced[0].share, 1.25 / 9.25, max_relative = 0.2);
         for s in &sliced {
             assert!(s.interval[0] <= s.excess && s.excess <= s.interval[1], "{s:?}");
         }
     }
 
-    /// With two slices each is the rest of the other: one is worse by what the other is better,
-    /// with the same variance.
+    /// If there are two slices, each is the rest for the other. One is worse by as much as the
+    /// other is better, with the same variance.
     #[test]
     fn of_two_slices_one_p_value_is_the_others_complement() {
         let mut random = RandomGenerator::new(2, 0);
@@ -217,8 +221,8 @@ mod tests {
         }
     }
 
-    /// Of 400 records in which no slice is worse, 5 in 100 have a p below 0.05: 20, standard
-    /// deviation 4.4; three of these to either side.
+    /// Of 400 recordings in which no slice is worse, 5 %, i.e. 20, have a p-value below 0.05. The
+    /// standard deviation of this number is 4.4; the tolerance is three times that.
     #[test]
     fn p_values_are_as_rare_as_they_say() {
         let mut random = RandomGenerator::new(3, 0);
@@ -227,9 +231,9 @@ mod tests {
         assert!((7..=33).contains(&rare), "{rare} of 400");
     }
 
-    /// Of 300 intervals 285 should hold the truth; a percentile bootstrap of 60 blocks holds about
-    /// 93 %. The lower limit is four standard deviations, 4.4 each, below 280; an interval that
-    /// always holds would be useless.
+    /// Of 300 intervals, 285 should contain the true value. Those of a percentile bootstrap of 60
+    /// blocks contain it in about 93 % of the cases, 280 of 300. The lower limit is four standard
+    /// deviations (4.4 each) below 280. The upper limit excludes intervals that always contain it.
     #[test]
     fn intervals_of_an_excess_hold_it() {
         let mut random = RandomGenerator::new(4, 0);
@@ -256,7 +260,7 @@ mod tests {
         let cells = (0..20).flat_map(|_| [(30.0, 25.0), (0.0, 0.0)]).collect();
         let sliced = Cells::new(2, cells).sliced(1, 0);
         assert_eq!(sliced[1], Sliced { share: 0.0, excess: 0.0, interval: [0.0; 2], p: 1.0 });
-        // A single slice has no rest to be compared with.
+        // A single slice cannot be compared with a rest.
         assert_eq!((sliced[0].share, sliced[0].p), (1.0, 1.0));
     }
 
@@ -279,8 +283,8 @@ mod tests {
         };
         let residual: Vec<f64> = (1..=10).map(f64::from).collect();
         let cells = Cells::of_samples(&roles, &residual, &axis);
-        // The blocks are samples 1 2, 3 4, 5, 8 9 and 10. Sample 5 is in no slice, samples 6 and 7
-        // are in no segment.
+        // The blocks consist of the samples 1 and 2, 3 and 4, 5, 8 and 9, and 10. Sample 5 is in no
+        // slice; samples 6 and 7 are in no segment.
         let expected = [
             [(1.0, 1.0), (4.0, 1.0)],
             [(16.0, 1.0), (9.0, 1.0)],
@@ -313,9 +317,9 @@ mod tests {
         }
     }
 
-    /// If nothing is present, something is found in exactly 5 of 100 recordings (theorem of
-    /// Benjamini and Hochberg, for independent p-values): of 2000 in 100, standard deviation 9.7;
-    /// three of these to either side.
+    /// If no slice is worse, a discovery is made in 5 % of the recordings (theorem of Benjamini and
+    /// Hochberg, for independent p-values). Of 2000 recordings these are 100, with a standard
+    /// deviation of 9.7; the tolerance is three times that.
     #[test]
     fn false_discoveries_are_as_rare_as_allowed() {
         let mut random = RandomGenerator::new(7, 0);
@@ -327,8 +331,9 @@ mod tests {
         assert!((71..=129).contains(&alarms), "{alarms} of 2000");
     }
 
-    /// Twenty of forty are real, so 0.05 times 20/40 of the findings are false on average. The
-    /// share in one record spreads by about 0.035, its mean over 500 by 0.0016: five of these.
+    /// Twenty of forty hypotheses are true effects, so on average a share of 0.05 times 20/40 of
+    /// the discoveries is false. This share has a standard deviation of about 0.035 in one
+    /// recording and of 0.0016 as a mean over 500; the tolerance is five times that.
     #[test]
     fn among_true_ones_few_are_false() {
         let mut random = RandomGenerator::new(8, 0);

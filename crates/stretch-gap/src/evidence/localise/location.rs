@@ -76,7 +76,8 @@ pub struct Where {
 }
 
 impl Where {
-    /// The stage of the simulator with the largest gap; `None` without a stage.
+    /// Returns the index of the simulator's stage with the largest gap; `None` if there is no
+    /// stage.
     pub fn worst(&self) -> Option<usize> {
         let stages = self.stages.iter().enumerate().filter(|(_, s)| !s.is_cause_only);
         stages.max_by(|a, b| a.1.excess.total_cmp(&b.1.excess)).map(|(i, _)| i)

@@ -1,4 +1,5 @@
-//! Locates the gap: by regime, level, rate, frequency, time and trial, and by stage in the chain.
+//! Locates the gap: by regime, level and rate of the motion, by frequency, time, travel and trial,
+//! and by stage in the chain of stages.
 
 mod axes;
 mod bands;
@@ -18,12 +19,14 @@ use crate::{
 use axes::{Axis, Course};
 use excess::{Cells, Sliced};
 
-/// Divides a residual, selected by `of`, over all trials along every axis.
+/// Divides a residual along every axis (regime, level, rate, time, travel, trial, frequency) into
+/// slices. `of` selects the residual of a stage.
 ///
 /// The excess of a slice is the mean square in it, in multiples of the noise, minus 1. Its interval
-/// is a bootstrap over blocks of 0.5 s (over windows for frequency bands). A slice is significant
-/// if its excess is above 0 and above that of the rest of the stage, after Benjamini and Hochberg's
-/// correction (doi 10.1111/j.2517-6161.1995.tb02031.x) over all slices.
+/// is computed by a bootstrap over blocks of 0.5 s (for frequency bands, over windows). A slice
+/// stands out if two conditions are met: the interval of its excess is above 0, and its excess is
+/// significantly above that of the rest of the stage, after Benjamini and Hochberg's correction
+/// (doi 10.1111/j.2517-6161.1995.tb02031.x) over all slices.
 pub(crate) fn slices(
     simulator: &dyn Simulator,
     evidence: &Evidence,
@@ -70,10 +73,12 @@ pub(crate) fn slices(
         .collect()
 }
 
-/// Shapley value of every stage in the gap of the last output when the stages run in a chain.
+/// Returns the share of every stage in the gap of the last output when the stages run in a chain.
+/// The shares are Shapley values: averages over all orders in which stages can be corrected.
 ///
-/// A stage that is not simulated is corrected by its errors on its measured input, so that errors
-/// of previous stages still pass through it. Empty if a stage cannot be run on another's output.
+/// From the output of a corrected stage, the errors that it makes on its measured input are
+/// subtracted; errors of previous stages still pass through it. The result is empty if a stage
+/// cannot be run on the output of another.
 ///
 /// # Errors
 /// Errors of the simulator.

@@ -1,5 +1,5 @@
-//! A line is linear in its parameters: its maximum a posteriori is a ridge regression that nalgebra
-//! solves.
+//! Compares fits of a straight line with a direct solution. A line is linear in its parameters, so
+//! the maximum a posteriori is a ridge regression, which nalgebra solves.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,18 +10,22 @@ use crate::{
     toys::{Law, Measured, Toy},
 };
 
-/// Relative to a tolerance. Each of the two fits of a preparation ends on a step damped by a
-/// thousandth, so it leaves at most this share of its way. Of a way of three tolerances, both
-/// together leave 3e-6.
+/// Relative to a tolerance. The preparation makes two fits. The last step of each fit is damped by
+/// a thousandth, so the fit leaves at most a thousandth of the way that it had to go. A way of
+/// three tolerances is reduced to 3e-6 by both together.
 const DAMPED: f64 = 1e-5;
-/// Relative: sensitivities are differences of outputs near 1 over steps of 0.03 tolerances of 0.05, each rounded by 1e-16.
+/// Relative: a sensitivity is a difference of outputs near 1, which are rounded by 1e-16, divided
+/// by a step of 0.03 tolerances; a tolerance is 0.05.
 const DIFFERENCED: f64 = 1e-9;
 
-/// Returns the minimum of sum (m - a'p)^2/(2 b sigma^2) + sum ((p - p0)/s)^2/2 over the fitted
-/// samples that count, with a = (x, 1), and the covariance there.
+/// Returns the parameters p at the minimum of sum (m - a'p)^2/(2 b sigma^2) + sum ((p - p0)/s)^2/2,
+/// and their covariance. The first sum is over the fitted samples that count, with the measured m,
+/// a = (x, 1), and b samples in a block. The second sum is the prior with mean p0 and standard
+/// deviation s.
 ///
-/// With an offset of standard deviation `offset` in each trial, sigma^2 I becomes sigma^2 I +
-/// offset^2 11', inverted by the formula of Sherman and Morrison.
+/// An offset of standard deviation `offset` in each trial changes the covariance of the trial's
+/// noise from sigma^2 I to sigma^2 I + offset^2 11', which is inverted by the formula of Sherman
+/// and Morrison.
 fn ridge(
     record: &Measured,
     counts: impl Fn(usize) -> bool,
@@ -93,14 +97,14 @@ fn samples_that_do_not_count_are_left_out_of_the_regression() {
     let spiked = [130, 777, 1500, 2222];
     for i in spiked {
         assert!(!is_lost(i));
-        // thirty standard deviations; a sample is isolated from eight on
+        // This is thirty standard deviations; from eight on, a sample is isolated.
         record.outputs[0][i] += 0.3;
     }
     assert_agrees(&record, |i| !is_lost(i) && !spiked.contains(&i), 0.0);
 }
 
-/// An offset in each trial is a nuisance: the trials' means determine the zero by three numbers,
-/// not by three thousand.
+/// An offset in each trial is a nuisance. The zero of the line is then determined only by the means
+/// of the three trials, not by three thousand samples.
 #[test]
 fn offsets_by_trial_are_marginalised_as_generalised_least_squares_does() {
     let mut toy = Toy::of(&[Law::Line]).off_by(&[0.5, 0.5]);
@@ -110,8 +114,8 @@ fn offsets_by_trial_are_marginalised_as_generalised_least_squares_does() {
     assert_agrees(&toy.measured(4), |_| true, 0.02);
 }
 
-/// Beyond three tolerances a parameter stays at the bound; the other one is then a separate
-/// regression.
+/// A parameter stays at its bound of three tolerances. The other parameter is then determined by a
+/// separate regression.
 #[test]
 fn a_parameter_is_held_at_three_tolerances() {
     for side in [-1.0, 1.0] {
@@ -121,7 +125,7 @@ fn a_parameter_is_held_at_three_tolerances() {
         approx::assert_relative_eq!(found[0], spec.nominal + side * 3.0 * spec.sd);
         let mut held = record.toy.clone();
         held.parameters[0].nominal = found[0];
-        // a tolerance so narrow that the regression leaves it where it is
+        // The tolerance is so narrow that the regression does not change this parameter.
         held.parameters[0].sd = 1e-9;
         let mut held = held.driven_by(record.x.clone(), 0);
         held.outputs = record.outputs;
@@ -157,7 +161,7 @@ fn cutting_a_trial_of_a_line_in_two_changes_nothing() {
     approx::assert_relative_eq!(one.0[..], other.0[..], max_relative = DIFFERENCED);
 }
 
-/// Reduced chi-square: the mean square of what is left over the square of the noise.
+/// The reduced chi-square is the mean square of the residual divided by the variance of the noise.
 #[test]
 fn a_misfit_is_the_mean_square_in_units_of_the_noise() {
     let record = Toy::of(&[Law::Line]).measured(8);
@@ -168,7 +172,7 @@ fn a_misfit_is_the_mean_square_in_units_of_the_noise() {
     let expected = fitted.clone().map(square).sum::<f64>() / fitted.len() as f64;
     let misfit = &problem.nominal.misfits[0];
     approx::assert_relative_eq!(misfit.fit, expected, max_relative = DIFFERENCED);
-    // No trial is long enough for a held-out part.
+    // No trial is long enough to have a held-out part.
     assert_eq!(misfit.held, 1.0);
     approx::assert_relative_eq!(
         problem.gap_in(&problem.nominal, 0),
@@ -177,8 +181,8 @@ fn a_misfit_is_the_mean_square_in_units_of_the_noise() {
     );
 }
 
-/// Samples that were not measured do not count: of 2400 samples that were, three standard errors
-/// sqrt(2/2400).
+/// Samples that were not measured do not count. 2400 samples were measured; the tolerance is three
+/// standard errors, 3 sqrt(2/2400).
 #[test]
 fn a_misfit_is_a_mean_over_what_was_measured() {
     let mut toy = Toy::of(&[Law::Line]);

@@ -1,5 +1,5 @@
-//! Slow drift marginalised out, compared with dense matrices; its size and correlation time
-//! estimated from the record.
+//! Compares the marginalisation of slow drift with dense matrices, and estimates size and
+//! correlation time of a drift from the recording.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -10,12 +10,13 @@ use crate::{
     toys::{Law, Toy, slow},
 };
 
-/// Relative: a dense factor of 250 rows with condition up to 1e4, against one of a few knots.
+/// Relative: a dense Cholesky factor of 250 rows and a condition of up to 1e4, compared with a
+/// factor for a few knots.
 const DENSE: f64 = 1e-9;
-/// Samples between knots of a drift: 0.1 s.
+/// Number of samples between knots of a drift, which are 0.1 s apart.
 const KNOT: usize = 10;
 
-/// A line whose zero drifts by `sd` and `correlation_s` as described.
+/// Returns a line whose zero drifts with the given standard deviation and correlation time.
 fn drifting(drift: SlowDrift, samples: usize) -> Toy {
     let mut toy = Toy { trials: vec![(samples, false), (samples, true)], ..Toy::of(&[Law::Line]) };
     toy.parameters[1].drift = Some(drift);
@@ -54,7 +55,7 @@ fn products_and_determinants_are_those_of_the_dense_covariance() {
         let product = metric.product(roles, &column(&x), &column(&y), Role::Fit);
         let factor = dense(drift, record.toy.noise, samples).cholesky().expect("definite");
         let expected = x.dot(&factor.solve(&y));
-        // A difference of sums as large as the samples.
+        // The tolerance is for a difference of sums that are as large as the number of samples.
         approx::assert_abs_diff_eq!(product, expected, epsilon = DENSE * samples as f64);
         let expected = 2.0 * factor.l().diagonal().map(f64::ln).sum();
         approx::assert_relative_eq!(
@@ -62,7 +63,7 @@ fn products_and_determinants_are_those_of_the_dense_covariance() {
             expected,
             max_relative = DENSE
         );
-        // The residual without its most likely drift is V^-1 of it.
+        // If x is a residual, x without its most likely drift is V^-1 x.
         let mut cleaned = x.as_slice().to_vec();
         metric.clean(roles, &mut cleaned);
         let expected = factor.solve(&x);
@@ -70,8 +71,7 @@ fn products_and_determinants_are_those_of_the_dense_covariance() {
     }
 }
 
-/// The re-tuned line with a drift of its zero, by generalised least squares with the dense
-/// covariance.
+/// Re-tuning a line whose zero drifts is generalised least squares with the dense covariance.
 #[test]
 fn re_tuning_beside_a_drift_is_generalised_least_squares() {
     let samples = 245;
@@ -92,14 +92,14 @@ fn re_tuning_beside_a_drift_is_generalised_least_squares() {
     let right = weighted.transpose() * (measured - &a * &start) / 50.0;
     let expected = start + normal.cholesky().expect("definite").solve(&right);
     for (p, spec) in toy.parameters.iter().enumerate() {
-        // As in a fit without drift: it ends on a step damped by a thousandth.
+        // As in a fit without drift, the last step is damped by a thousandth.
         assert!((found[p] - expected[p]).abs() < 1e-5 * spec.sd, "{found:?} {expected}");
     }
 }
 
-/// Three trials of 29 s hold 15 to 60 correlation times, which determine a size to a tenth and a
-/// time to about thirty per cent. Sizes are tried in steps of up to 1.75, times in steps of up to
-/// 2.5, so the neighbour of the right one may win and none beyond it.
+/// Three trials of 29 s contain 15 to 60 correlation times, which determine the size to 10 % and
+/// the correlation time to about 30 %. Sizes are tried in ratios of up to 1.75 and times in ratios
+/// of up to 2.5, so the right value or one of its neighbours must win.
 #[test]
 fn size_and_time_of_a_drift_are_found_to_the_next_that_is_tried() {
     let described = SlowDrift { sd: 0.05, correlation_s: 3.0 };

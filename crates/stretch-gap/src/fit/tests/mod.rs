@@ -1,4 +1,4 @@
-//! Fits of toys whose answers are known in closed form.
+//! Fits of toy simulators for which the results are known in closed form.
 
 mod least_squares;
 mod marginal;
@@ -11,12 +11,12 @@ use crate::{
 
 static GO_ON: fn() -> bool = || false;
 
-/// A toy prepared as a diagnosis prepares it.
+/// Returns a toy problem, prepared as in a diagnosis.
 pub(crate) fn prepared(measured: &Measured) -> PreparedProblem<'_> {
     PreparedProblem::prepare(measured, &GO_ON, 1, &|_: &str| ()).expect("a problem")
 }
 
-/// The re-tuned nominal with some effects at some values, not yet fitted.
+/// Returns the re-tuned nominal simulator with some effects at the given values, not fitted.
 pub(crate) fn with_effects(
     problem: &PreparedProblem<'_>,
     effects: &[(usize, Vec<f64>)],

@@ -1,4 +1,4 @@
-//! Noise of the measured input that arrives at an output, compared with the variance from theory.
+//! Compares the variance of the input noise that arrives at an output with theory.
 
 use super::prepared;
 use crate::{
@@ -12,8 +12,9 @@ use crate::{
     toys::{Effect, Law, Measured, Toy},
 };
 
-/// Relative: standard deviation from twelve draws of 4000 samples, of which a lag of ten makes every twentieth independent:
-/// 1/sqrt(2 * 2400) = 1.4 %, three of them.
+/// Relative: three times the standard error of a standard deviation from twelve draws of 4000
+/// samples. With a lag of ten samples, every twentieth sample is independent, i.e. 2400 in total.
+/// The standard error is 1/sqrt(2 * 2400) = 1.4 %.
 const DRAWN: f64 = 0.045;
 
 fn root_mean_square(record: &Measured, stage: usize) -> f64 {
@@ -40,7 +41,7 @@ fn noise_of_the_input_arrives_as_theory_says() {
     assert_eq!(root_mean_square(&quiet, 0), 0.01);
 }
 
-/// An error in variables is no gap: with the transmitted noise included, the reduced chi-square is
+/// Noise of the input is no gap: if the transmitted noise is included, the reduced chi-square is
 /// one.
 #[test]
 fn an_input_that_is_noisy_leaves_no_gap() {
@@ -48,13 +49,14 @@ fn an_input_that_is_noisy_leaves_no_gap() {
         let toy = Toy { input_noise: 0.03, ..Toy::of(&[law]) };
         let record = toy.measured(2);
         let problem = prepared(&record);
-        // 3000 samples that are correlated over ten: sqrt(2/300) = 0.08, three of them.
+        // The tolerance is three standard errors. 3000 samples that are correlated over ten have
+        // the standard error sqrt(2/300) = 0.08.
         approx::assert_abs_diff_eq!(problem.nominal.misfits[0].fit, 1.0, epsilon = 0.25);
     }
 }
 
-/// If no noise is stated, the record's second differences determine it: 1.6/sqrt(3000) of it is one
-/// standard error, five of them.
+/// If no noise level is stated, the recording's second differences determine it, with a relative
+/// standard error of 1.6/sqrt(3000). The tolerance is five times that.
 #[test]
 fn noise_that_is_not_stated_comes_from_the_record() {
     for law in [Law::Line, Law::Lag, Law::Oscillator] {
@@ -67,8 +69,8 @@ fn noise_that_is_not_stated_comes_from_the_record() {
     }
 }
 
-/// Four samples per turn: second differences of the record hold the motion itself, those of the
-/// residual of the true law hold the noise.
+/// The motion has only four samples per period. Second differences of the recording therefore
+/// contain the motion itself; those of the residual of the true law contain only the noise.
 #[test]
 fn motion_that_is_quick_is_no_noise() {
     let toy = Toy { dt_s: 0.25, noise: 0.01, stated: None, ..Toy::of(&[Law::Oscillator]) };

@@ -1,26 +1,27 @@
-//! Jitter of a known size added to records, and records without any.
+//! Tests with simulated residuals: with jitter of a known size, and without jitter.
 
 use super::jitter_sd_s;
 use crate::numerics::random::RandomGenerator;
 
 const DT_S: f64 = 0.01;
 const SAMPLES: usize = 3000;
-/// Amplitude of the signal in multiples of the sensor noise, which is the unit of all records here.
+/// Amplitude of the signal in multiples of the sensor noise, which is the unit of all signals in
+/// these tests.
 const SIGNAL: f64 = 100.0;
 
-/// What a test record lacks.
+/// The effect that the simulator lacks in a test.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Lack {
     Nothing,
     /// Time stamps that jitter, s.
     Jitter(f64),
-    /// A delay, s.
+    /// A constant delay, s.
     Late(f64),
     /// Noise proportional to the value.
     ByLevel(f64),
-    /// Jumps of that size, back and forth.
+    /// Jumps of this size, back and forth.
     Jumps(f64),
-    /// A play of that width.
+    /// Play of this width.
     Play(f64),
 }
 
@@ -28,11 +29,12 @@ enum Lack {
 #[derive(Debug, Clone, Copy)]
 enum Noise {
     White,
-    /// Autoregressive of first order with that share kept, plus white noise.
+    /// White noise plus an autoregressive process of first order that keeps this share from sample
+    /// to sample.
     Coloured(f64),
 }
 
-/// The signal at t. Its motion fades to rest and returns, again and again.
+/// Returns the signal at the time t. Its motion fades to rest and returns, again and again.
 fn at(t: f64) -> f64 {
     let moves = (0.5 + 0.8 * (0.7 * t).cos()).max(0.0);
     SIGNAL * moves * moves * ((1.3 * t).sin() + 0.4 * (4.7 * t + 1.0).sin())
@@ -81,7 +83,7 @@ fn found(lack: Lack, noise: Noise, seed: u64) -> Option<f64> {
     jitter_sd_s(&stretches, &shown, DT_S, 0.5 * above)
 }
 
-/// Half of 6,000 samples move enough to show it: its variance is estimated to about 3 %.
+/// Half of 6,000 samples move enough to show jitter, so its variance is estimated to about 3 %.
 #[test]
 fn jitter_is_told_with_its_size_in_white_noise() {
     for seed in 0..4 {
@@ -93,7 +95,7 @@ fn jitter_is_told_with_its_size_in_white_noise() {
     }
 }
 
-/// Coloured noise as large as the white noise, that forgets within 2 to 50 samples.
+/// The coloured noise is as large as the white noise and has a correlation time of 2 to 50 samples.
 #[test]
 fn jitter_is_told_with_its_size_in_coloured_noise() {
     for seed in 0..4 {

@@ -19,7 +19,8 @@ use rand_xoshiro::{
 pub struct RandomGenerator(SplitMix64);
 
 impl RandomGenerator {
-    /// Creates a generator. Different `stream` numbers give independent sequences of the same seed.
+    /// Creates a generator of one of the streams of a seed. Neighbouring streams are copies of each other, shifted by one
+    /// or two numbers, because SplitMix64 takes the same step from number to number. Independent numbers need another seed.
     pub fn new(seed: u64, stream: u64) -> Self {
         let seed = seed ^ stream.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let mut random = Self(SplitMix64::seed_from_u64(seed));

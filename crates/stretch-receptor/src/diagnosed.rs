@@ -93,7 +93,8 @@ pub struct Diagnosed<T> {
     pub turn_threshold: T,
     /// Variance of the muscle's position if it may be anywhere in the slip.
     pub slip_variance: T,
-    /// Share of that variance that a sample adds.
+    /// Share of the remaining difference by which, at each sample, the variance hidden by the slip approaches
+    /// `slip_variance`.
     pub slip_variance_share: T,
     /// Reference units per target.
     pub gain: T,

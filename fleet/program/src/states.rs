@@ -35,7 +35,8 @@ struct Unit<'a> {
 }
 
 impl Unit<'_> {
-    /// Returns a digest of the trials and of the functions' release. It changes with either.
+    /// Returns a digest of the trials' digests, the version of `stretch_fleet` (which provides the SQL functions) and the
+    /// version of the stored states.
     fn sources(&self) -> String {
         let version = format!("poly13 {} {}", stretch_fleet::VERSION, stretch_fleet::STATE_VERSION);
         let names = self.files.iter().map(|file| file.footer.digest.as_bytes());

@@ -96,8 +96,8 @@ proptest! {
         prop_assert!(j <= 2.0 * acceleration / round_s + 100.0 * ROUNDING, "{j} above {}", 2.0 * acceleration / round_s);
     }
 
-    /// A rounding time of 0 gives the trapezoid to the last bit. A short one changes it by at most the distance covered
-    /// in half of that time.
+    /// A rounding time of 0 gives the trapezoid to the last bit. A short rounding time moves a
+    /// position by at most the distance that is covered at the highest rate in half of the rounding time.
     #[test]
     fn a_large_jerk_is_the_trapezoid(
         command in proptest::collection::vec(-5.0..5.0_f64, 2..12), acceleration in 5.0..80.0_f64, rate in 0.5..4.0_f64, round_s in 1e-6..1e-3_f64

@@ -20,7 +20,7 @@ pub(crate) struct Naming {
     pub(crate) named: Vec<String>,
     /// Pairs of a name and an alternative effect.
     pub(crate) ties: Vec<(String, String)>,
-    /// Effects that were found but close less than a named effect must.
+    /// Effects that were found but close less of the gap than an effect must close to be named.
     pub(crate) faint: Vec<String>,
 }
 

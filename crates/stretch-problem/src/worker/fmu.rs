@@ -15,8 +15,8 @@ const VARIABLE: &str = "STRETCH_FMU";
 const PROGRAM: &str = "stretch-fmu";
 
 impl WorkersSpec {
-    /// An FMU in a folder, run by the program `stretch-fmu`: the one of the variable `STRETCH_FMU`,
-    /// else one next to this program, else one on the path.
+    /// An FMU in a folder, run by the program `stretch-fmu`. The environment variable `STRETCH_FMU`
+    /// names this program; without it, it is looked for next to the running program, then on the `PATH`.
     ///
     /// `variables` holds the FMU's names of parameters, effects and columns where these differ from
     /// the problem's names; `units` holds the problem's units of parameters and effects.

@@ -185,7 +185,7 @@ impl Workers {
         }
     }
 
-    /// Takes a worker back that is no longer at work: it is idle again, or gone.
+    /// Ends the use of a worker: it is idle again or, with `None`, gone because it did not start or did not answer.
     fn left(&self, process: Option<Process>) {
         let mut crew = self.crew.lock().unwrap_or_else(PoisonError::into_inner);
         crew.busy -= 1;

@@ -324,8 +324,8 @@ fn on(array: &Array, clocks: &[ClockArray]) -> Option<usize> {
     }
 }
 
-/// Rates how well the name of an array matches the group `of` of a clock: 1 if the group has no name, 1 plus the length
-/// of the group's name if the array is in the group or named after it, and 0 otherwise.
+/// Rates how well the name of an array matches the group of a clock, whose name is `of`: 1 if `of` is empty, 1 plus the
+/// length of `of` if the array is in the group or named after it, and 0 otherwise.
 fn nearness(name: &str, of: &str) -> usize {
     let path = name.to_lowercase().replace('.', "/");
     let of = of.to_lowercase().replace('.', "/");

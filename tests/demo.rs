@@ -94,7 +94,7 @@ fn with_data_measured_sessions_take_the_same_way() {
     let command = &mut stretch();
     command.args(["demo", "--data"]).arg(sleeve.join("heel"));
     command.arg("--out").arg(scratch.path("other"));
-    fails(command, &["no sessions heel", "heel_curl_45, heel_curl_90, lift_up"]);
+    fails(command, &["no group of sessions heel", "heel_curl_45, heel_curl_90, lift_up"]);
 }
 
 #[test]

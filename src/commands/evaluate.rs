@@ -50,8 +50,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         columns = columns.require(calibration.spec().signal.as_str());
         columns = columns.require(calibration.spec().reference.as_str());
     }
-    let renamed =
-        "a calibration needs the columns that it was fitted to: rename yours with stretch convert";
+    let renamed = "a calibration needs the columns that it was fitted to: rename them, and convert their units, with stretch convert --column NEW=OLD*FACTOR";
     let trials = read_trials(&args.trials, Split::Test, &columns)
         .map_err(|error| with_columns_to_name(error, renamed))?;
     let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
@@ -88,7 +87,7 @@ pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
     }
     say(
         "Average error: mean |reference - estimate| over the range of the estimate, as in the paper. Lag: positive if the estimate \
-         is late. Outside domain: samples that were clamped to the ends of the calibrated range.",
+         is late. Outside domain: samples whose signal or rate of change was clamped to the calibrated range.",
     )?;
     if evaluation.comparisons.is_empty() {
         return Ok(());

@@ -130,7 +130,7 @@ fn renew(args: RenewArgs) -> anyhow::Result<()> {
     let signals = prior.signals.clone();
     let columns = signals.iter().fold(ReadOptions::new(), |all, name| all.require(name));
     let trials = read_trials(&args.trials, Split::Fit, &columns);
-    let own = "the prior needs these columns: rename yours with stretch convert";
+    let own = "the prior needs these columns: rename them, and convert their units, with stretch convert --column NEW=OLD*FACTOR";
     let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
     let options =
         RenewOptions { signals: signals.clone(), calibration, ..RenewOptions::of(&args.of) };

@@ -96,7 +96,11 @@ impl fmt::Display for DesignError {
                  the original file again, or calibrate again"
             ),
             Self::NoRecord => {
-                write!(f, "the bytes are not exactly one calibration of this kind: calibrate again")
+                write!(
+                    f,
+                    "the bytes are not exactly one calibration of this kind: nothing is stored there, it was cut off, or it has \
+                     another form (integers, floating point); write it again, or calibrate again"
+                )
             }
             Self::Schema { found: 3, .. } => write!(
                 f,

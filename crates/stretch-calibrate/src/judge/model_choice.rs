@@ -234,7 +234,7 @@ fn notes(trials: &[Trial], options: &Options, memory_shows: bool) -> Vec<String>
     if trials.len() < LEAST_TRIALS {
         notes.push(format!(
             "{} {} left out in {PARTS} parts each, which cannot show a drift between sessions; \
-             record a second session to check for it",
+             from {LEAST_TRIALS} trials on, whole trials are left out",
             trials.len(),
             if trials.len() == 1 { "trial was" } else { "trials were" }
         ));

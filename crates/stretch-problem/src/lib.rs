@@ -39,6 +39,6 @@ pub use problem::{Diagnosable, Problem, Reading, name_of};
 pub use rig::{RigSession, RigSetup, RigSimulator, RigTrial};
 pub use sensors::sensors;
 pub use stretch_data::EffectEntry;
-pub use stretch_effects::{KINDS, Kind, Language, kind_named};
+pub use stretch_effects::{KINDS, Kind, Language, Side, kind_named};
 pub use stretch_sim::Tolerance;
 pub use words::{effect_in_words, in_words, notation};

@@ -21,7 +21,7 @@ fn started(spec: ProblemSpec, workers: WorkersSpec) -> Result<Workers, String> {
 fn an_fmu_that_cannot_run_is_refused_at_the_start() {
     let cases = [
         (Wrong::Function, "has no function fmi"),
-        (Wrong::Platform, "it holds binaries/win64; export it for this platform"),
+        (Wrong::Platform, "it contains binaries/win64; export it for this platform"),
         (Wrong::Library, "its library cannot be loaded"),
         (Wrong::Token, "it cannot be instantiated"),
         (

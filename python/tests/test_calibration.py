@@ -86,7 +86,7 @@ def test_integers_lists_and_strided_arrays_are_arrays(fitted):
     ("spoil", "words"),
     [
         (lambda s, a: (s[:-1], a), "1999"),
-        (lambda s, a: (np.full_like(s, np.nan), a), "no sample has a number in every column; gauge_mv is nan in sample 0"),
+        (lambda s, a: (np.full_like(s, np.nan), a), "no sample has a number in every column; signal is nan in sample 0"),
         (lambda s, a: (s.reshape(2, 1000), a), "give as many"),
         (lambda s, a: (np.zeros_like(s), a), "signal is 0 throughout"),
         (lambda s, a: (s[:1], a[:1]), "1 samples are too few"),

@@ -308,5 +308,5 @@ fn an_executor_listens_where_it_is_said_to_be() {
     let address: std::net::SocketAddr = told.parse().unwrap();
     assert!(address.ip().is_loopback(), "{line}");
     let said = refused(executor, &["--scheduler", "nobody.invalid:1"]);
-    assert!(said.contains("nobody.invalid is no address"), "{said}");
+    assert!(said.contains("the host nobody.invalid has no address"), "{said}");
 }

@@ -152,7 +152,10 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
         serde_json::from_str(&fs::read_to_string(json).unwrap()).unwrap();
     assert_eq!(value["by_trial"]["runs"][1]["values"][2]["name"], "brake.brake");
     let (is_good, text) = said(&both, &["--by", "load_kg"]);
-    assert!(!is_good && text.contains("there is no column load_kg; the columns are time_s"), "{text}");
+    assert!(
+        !is_good && text.contains("there is no column load_kg; the columns are time_s"),
+        "{text}"
+    );
 
     // A Python object as the simulator, which raises an error.
     let module = "def servo(parameters, effects):\n    raise ValueError('no such gear')\n";

@@ -248,7 +248,10 @@ fn with_python_a_worker_that_dies_once_is_started_anew() {
 #[ignore = "needs python3; ./ci.sh runs it"]
 fn with_python_a_worker_that_does_not_fit_is_refused_at_its_hello() {
     let cases = [
-        ("begin(units={'angle_deg': 'rad'})", "column angle_deg in rad, but the problem has it in deg"),
+        (
+            "begin(units={'angle_deg': 'rad'})",
+            "column angle_deg in rad, but the problem has it in deg",
+        ),
         ("begin(parameters=['gain'])", "it has no parameter tau; it has gain"),
         ("receive(); send({'kind': 'hello', 'version': 9})", "it speaks version 9"),
         ("sys.exit('no licence')", "no licence"),

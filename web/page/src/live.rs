@@ -205,22 +205,28 @@ impl Frames {
                 &format!(", {} of another version: update the page or the board", c.other_version);
         }
         if self.missing > 0 {
-            text += &format!("; {} samples that the board did not get", self.missing);
+            text += &format!(
+                "; {} samples that the board did not get from its converter",
+                self.missing
+            );
         }
         if let (1.., largest) = self.beyond {
             let (count, bits) = (self.beyond.0, self.adc.spec().bits);
             text += &format!(
-                "; {count} codes up to {largest} are beyond a converter of {bits} bits and no rows"
+                "; {count} codes up to {largest} exceed a converter of {bits} bits and are not recorded"
             );
         }
         if self.standing > 0 {
             text += &format!(
-                "; the board's clock stood still at {} frames: they are without a new time and no rows",
+                "; the board's clock did not advance at {} frames, which are not recorded",
                 self.standing
             );
         }
         if self.compared.0 > 0 {
-            text += &format!("; differs from the calibration by {:.4} {unit}", self.compared.1);
+            text += &format!(
+                "; the estimates differ from the calibration by up to {:.4} {unit}",
+                self.compared.1
+            );
         }
         text
     }

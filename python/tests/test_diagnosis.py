@@ -86,6 +86,13 @@ def test_a_recording_is_named_by_its_path(bent, tmp_path):
         assert found.effects["bend"]["bend"] == pytest.approx(bent.effects["bend"]["bend"], rel=1e-6)
 
 
+def test_one_input_may_be_given_by_its_name(bent):
+    found = diagnose(Spring(), BENT, inputs="force_N")
+    assert found.sentence == bent.sentence
+    with pytest.raises(stretch_gap.StretchError, match=r"columns of a Trial are a str; .*Trial\(stretch_gap.read"):
+        stretch_gap.diagnose(Spring(), stretch_gap.Trial("day1.csv"), output="length_mm")
+
+
 def test_a_missing_sample_is_bridged_with_a_warning():
     broken = np.where(np.arange(BENT.size) == 1000, np.nan, BENT)
     with pytest.warns(stretch_gap.DoubtWarning, match=r"sample 1000 of length_mm is nan"):

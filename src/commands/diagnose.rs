@@ -71,8 +71,6 @@ pub(crate) struct Args {
     /// Folder with dataset.toml, a trial in any format, - for standard input, or problem.toml
     #[arg(value_name = "DATASET")]
     data_set: PathBuf,
-    #[arg(hide = true)]
-    others: Vec<PathBuf>,
     /// Rig file of the simulator
     ///
     /// Nominal parameters with their tolerances, and the effects that the simulator already has.
@@ -184,12 +182,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 }
 
 fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
-    ensure!(
-        args.others.is_empty(),
-        "{} and {} more: diagnose takes one recording, or the folder of a dataset.toml that lists several",
-        args.data_set.display(),
-        args.others.len()
-    );
     let is_there = args.data_set.as_os_str() == "-" || args.data_set.exists();
     let files = [&args.report, &args.fix, &args.experiment].map(|path| path.as_deref());
     args.json.share_stdout(files)?;

@@ -439,7 +439,7 @@ def diagnose(
     data: entries.Data,
     *,
     output: str | None = None,
-    inputs: Sequence[str] = (),
+    inputs: str | Sequence[str] = (),
     stages: Sequence[entries.Stage] | None = None,
     parameters: Mapping[str, entries.ParameterLike] | None = None,
     effects: Mapping[str, entries.EffectLike] | None = None,
@@ -496,7 +496,7 @@ def diagnose(
         `effects` are then errors, and the arguments from `inputs` to `reference` have no effect.
     output : str, optional
         Column of the measurement that the simulation is compared with. Give either `output` or `stages`.
-    inputs : sequence of str, default ()
+    inputs : str or sequence of str, default ()
         Columns that drive the simulator. Ignored if `stages` is given.
     stages : sequence of Stage, optional
         Stages of a simulator with several outputs.
@@ -607,6 +607,7 @@ def diagnose(
             )
         if (output is None) == (stages is None):
             raise StretchError("give either output, the name of the measured column, or stages")
+        inputs = [inputs] if isinstance(inputs, str) else inputs
         listed = list(stages or [entries.Stage(str(output), tuple(inputs), velocity=velocity, position=position)])
         units, noise = units or {}, noise or {}
         driven = list(dict.fromkeys(c for one in listed for c in one.inputs))

@@ -203,6 +203,11 @@ def recorded(data: Data, rate_hz: float | None, wanted: Iterable[str]) -> list[t
         raise StretchError("data is empty; give at least one recording")
     for i, trial in enumerate(every):
         name = trial.name or (f"recording {i + 1}" if len(every) > 1 else "the recording")
+        if not isinstance(trial.columns, Mapping):
+            raise StretchError(
+                f"{name}: the columns of a Trial are a {type(trial.columns).__name__}; give a dict of arrays by column, such as "
+                'Trial(stretch_gap.read("day1.csv"))'
+            )
         held = dict(trial.columns)
         stamps = trial.time_s
         if stamps is None and trial.rate_hz is None:

@@ -69,7 +69,9 @@ impl Diagnosis {
                 "Add them to the simulator, then diagnose again."
             }
             Some(Answer::WrongRecord { .. }) => "Put the record right, then diagnose again.",
-            Some(Answer::Unknown { .. }) if self.proposed.is_some() => {
+            Some(Answer::Unknown { .. })
+                if self.proposed.as_ref().is_some_and(|p| !p.equation.is_empty()) =>
+            {
                 "Add the proposed term to the simulator, then diagnose again."
             }
             Some(Answer::Unknown { .. } | Answer::AtBounds { .. }) => {

@@ -29,7 +29,7 @@ fn an_fmu_that_cannot_run_is_refused_at_the_start() {
             "its modelDescription.xml cannot be used: there is no such file in the FMU",
         ),
         (Wrong::Version, "it uses FMI 1.0; only FMI 2.0 and FMI 3.0 are supported"),
-        (Wrong::Exchange, "brings no solver; export it for co-simulation"),
+        (Wrong::Exchange, "contains no solver; export it for co-simulation"),
     ];
     for fmi in [2, 3] {
         for (wrong, told) in cases {

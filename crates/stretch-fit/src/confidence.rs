@@ -116,10 +116,9 @@ impl<'a, T: Real, const TERMS: usize> Confidence<'a, T, TERMS> {
     }
 
     fn scheffe(&self) -> T {
-        let terms = self.fit.terms() as u64;
-        T::from_f64(libm::sqrt(
-            terms as f64 * fisher_f::critical(1.0 - self.level, terms, self.fit.dof()),
-        ))
+        let terms = self.fit.terms() as u16;
+        let quantile = fisher_f::critical(1.0 - self.level, terms, self.fit.dof());
+        T::from_f64(libm::sqrt(f64::from(terms) * quantile))
     }
 
     fn at(&self, rate: T, volts: T, factor: T, noise: T) -> Bounds<T> {

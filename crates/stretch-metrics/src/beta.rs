@@ -49,10 +49,10 @@ pub(crate) fn tail_at(root: f64, a: f64, b: f64, ln_beta: f64) -> Tail {
 }
 
 /// Returns ln B(a, halves / 2), by the recurrence B(a, b + 1) = B(a, b) b / (a + b) from B(a, 1/2) or B(a, 1) = 1/a.
-pub(crate) fn ln_beta(a: f64, halves: u64) -> f64 {
+pub(crate) fn ln_beta(a: f64, halves: u16) -> f64 {
     let (mut b, mut ln) =
         if halves % 2 == 1 { (0.5, ln_beta_half(a)) } else { (1.0, -libm::log(a)) };
-    while b < 0.5 * halves as f64 {
+    while b < 0.5 * f64::from(halves) {
         ln += libm::log(b / (a + b));
         b += 1.0;
     }

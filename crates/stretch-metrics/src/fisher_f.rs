@@ -13,11 +13,11 @@ use crate::beta::{ln_beta, root, tail_at};
 /// let t = stretch_metrics::student_t::critical(0.05, 7.0);
 /// approx::assert_relative_eq!(critical(0.05, 1, 7), t * t, max_relative = 1e-12);
 /// ```
-pub fn critical(p: f64, terms: u64, dof: u64) -> f64 {
+pub fn critical(p: f64, terms: u16, dof: u64) -> f64 {
     if !(0.0..=1.0).contains(&p) || terms == 0 || dof == 0 {
         return f64::NAN;
     }
-    let (numerator, denominator) = (terms as f64, dof as f64);
+    let (numerator, denominator) = (f64::from(terms), dof as f64);
     let (a, b, ln_beta) = (0.5 * denominator, 0.5 * numerator, ln_beta(0.5 * denominator, terms));
     let per_root = libm::sqrt(numerator / denominator);
     root(|f| tail_at(libm::sqrt(f) * per_root, a, b, ln_beta).ln(), libm::log(p))

@@ -58,7 +58,7 @@ fn tail(t: f64, dof: f64) -> Tail {
         return Tail::Rest(f64::NAN);
     }
     let t = t.abs();
-    if dof.is_infinite() && t.is_finite() {
+    if dof.is_infinite() {
         return normal_tail(t);
     }
     tail_at(t / libm::sqrt(dof), 0.5 * dof, 0.5, ln_beta(0.5 * dof, 1))

@@ -111,8 +111,17 @@ fn quantiles_agree_with_sixty_digits() {
             |a: f64, b| relative_eq!(a, b, epsilon = 0.0, max_relative = tolerance::FIT_QUANTILE);
         let t = critical(1.0 - level, dof);
         assert!(near(t, *expected), "t at {level} of {dof}: {t:?}");
-        let f = fisher_f::critical(1.0 - level, terms as u64, dof as u64);
+        let f = fisher_f::critical(1.0 - level, terms as u16, dof as u64);
         assert!(near(f, table["f"][row]), "F at {level} of {terms}, {dof}: {f:?}");
+    }
+}
+
+/// Neither argument alone makes a tail undefined, and both together do not.
+#[test]
+fn an_infinite_t_has_a_tail_of_zero_for_any_degrees_of_freedom() {
+    for dof in [1.0, 1e6, f64::INFINITY] {
+        assert_eq!(two_tailed(f64::INFINITY, dof), 0.0, "{dof}");
+        assert_eq!(ln_two_tailed(f64::INFINITY, dof), f64::NEG_INFINITY, "{dof}");
     }
 }
 

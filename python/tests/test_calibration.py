@@ -115,6 +115,15 @@ def test_a_sample_without_a_number_is_left_out_as_in_a_file(fitted, tmp_path, sp
     assert json.loads(one.to_json())["model"] == json.loads(same.to_json())["model"]
 
 
+def test_a_missing_sample_has_no_estimate_and_the_others_keep_theirs(tested, poly13):
+    signal, _ = tested
+    broken = np.where(np.arange(signal.size) == 700, np.nan, signal)
+    whole, estimate = poly13.apply(signal, RATE_HZ), poly13.apply(broken, RATE_HZ)
+    assert estimate.value.shape == whole.value.shape
+    assert np.isnan(estimate.value[700]) and not estimate.inside[700]
+    assert np.array_equal(np.isnan(np.delete(estimate.value, 700)), np.isnan(np.delete(whole.value, 700)))
+
+
 def test_bad_questions_are_refused_in_a_sentence(fitted, poly13):
     with pytest.raises(stretch_gap.StretchError, match='"poly99" is not understood; use linear'):
         stretch_gap.calibrate(*fitted, RATE_HZ, model="poly99")

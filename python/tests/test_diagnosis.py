@@ -89,6 +89,7 @@ def test_a_recording_is_named_by_its_path(bent, tmp_path):
 def test_one_input_may_be_given_by_its_name(bent):
     found = diagnose(Spring(), BENT, inputs="force_N")
     assert found.sentence == bent.sentence
+    assert stretch_gap.Stage("length_mm", "force_N") == stretch_gap.Stage("length_mm", ("force_N",))
     with pytest.raises(stretch_gap.StretchError, match=r"columns of a Trial are a str; .*Trial\(stretch_gap.read"):
         stretch_gap.diagnose(Spring(), stretch_gap.Trial("day1.csv"), output="length_mm")
 

@@ -272,10 +272,8 @@ class Diagnosis:
         """
         if not self._curves:
             raise StretchError("this diagnosis was read from text, which contains no curves; diagnose again")
-        name = output or next(iter(self._curves))
-        if name not in self._curves:
-            raise StretchError(f"there is no output {name}; the outputs are {', '.join(self._curves)}")
-        return dict(zip(("measured", "as_shipped", "retuned", "with_effects"), self._curves[name]))
+        four = self._curves[figures.output_of(self._curves, output)]
+        return dict(zip(("measured", "as_shipped", "retuned", "with_effects"), four))
 
     def plot(self, output: str | None = None) -> Any:
         """Draw the curves of one output, and measured minus simulated below them. Requires matplotlib.
@@ -296,8 +294,7 @@ class Diagnosis:
             If there is no such output, if the diagnosis was read from text, or if matplotlib is not installed.
         """
         values = self.curves(output)
-        name = output or next(iter(self._curves))
-        return figures.curves(values, float(self._session.get("dt_s", 1.0)), name, self.sentence)
+        return figures.draw(values, self._session["dt_s"], figures.output_of(self._curves, output), self.sentence)
 
     def fix(self) -> Fix:
         """Return the changes that the simulator needs.
@@ -607,8 +604,7 @@ def diagnose(
             )
         if (output is None) == (stages is None):
             raise StretchError("give either output, the name of the measured column, or stages")
-        inputs = [inputs] if isinstance(inputs, str) else inputs
-        listed = list(stages or [entries.Stage(str(output), tuple(inputs), velocity=velocity, position=position)])
+        listed = list(stages or [entries.Stage(str(output), inputs, velocity=velocity, position=position)])
         units, noise = units or {}, noise or {}
         driven = list(dict.fromkeys(c for one in listed for c in one.inputs))
         wrappers = [wrap] if isinstance(wrap, str) else list(wrap or ())

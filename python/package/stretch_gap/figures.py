@@ -15,7 +15,15 @@ from ._stretch import StretchError
 Array = NDArray[np.float64]
 
 
-def curves(values: Mapping[str, Array], dt_s: float, output: str, title: str) -> Any:
+def output_of(curves: Mapping[str, Any], output: str | None) -> str:
+    """Return the name of the output that is asked for: by default the first one. Raise an error if there is no such output."""
+    name = output or next(iter(curves))
+    if name not in curves:
+        raise StretchError(f"there is no output {name}; the outputs are {', '.join(curves)}")
+    return name
+
+
+def draw(values: Mapping[str, Array], dt_s: float, output: str, title: str) -> Any:
     """Draw two axes above each other: the measured and the simulated curves, and measured minus simulated. Return the axes."""
     try:
         from matplotlib import pyplot  # type: ignore[import-not-found,unused-ignore]

@@ -197,10 +197,8 @@ class Prediction:
         StretchError
             If there is no such output.
         """
-        name = output or next(iter(self._curves))
-        if name not in self._curves:
-            raise StretchError(f"there is no output {name}; the outputs are {', '.join(self._curves)}")
-        return dict(zip(("measured", "without", "with_effects"), self._curves[name]))
+        three = self._curves[figures.output_of(self._curves, output)]
+        return dict(zip(("measured", "without", "with_effects"), three))
 
     def plot(self, output: str | None = None) -> Any:
         """Draw the curves of one output, and measured minus simulated below them. Requires matplotlib.
@@ -220,7 +218,7 @@ class Prediction:
         StretchError
             If there is no such output, or if matplotlib is not installed.
         """
-        return figures.curves(self.curves(output), self._dt_s, output or next(iter(self._curves)), self.sentence)
+        return figures.draw(self.curves(output), self._dt_s, figures.output_of(self._curves, output), self.sentence)
 
     def to_json(self) -> str:
         """Return the prediction as JSON, without the curves.

@@ -110,7 +110,7 @@ class Stage:
     ----------
     output : str
         Column of the measurement that the simulation is compared with.
-    inputs : sequence of str, default ()
+    inputs : str or sequence of str, default ()
         Columns that drive the stage.
     name : str, default ""
         Name of the stage. By default `"simulator"` for the first stage, and `"stage 2"`, `"stage 3"` and so on for the others.
@@ -126,12 +126,16 @@ class Stage:
     """
 
     output: str
-    inputs: Sequence[str] = ()
+    inputs: str | Sequence[str] = ()
     name: str = ""
     unit: str = ""
     noise: float | None = None
     velocity: str | None = None
     position: str | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.inputs, str):
+            object.__setattr__(self, "inputs", (self.inputs,))
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ pub(crate) struct Args {
         long,
         conflicts_with_all = SLEEVE,
         hide_possible_values = true,
-        value_parser = Completed { names: &MODELS, parser: str::parse::<Model> }
+        value_parser = Completed { names: models, parser: str::parse::<Model> }
     )]
     model: Option<Model>,
     /// Column of the reference, whose last part is the unit
@@ -181,19 +181,11 @@ impl FromStr for Rate {
     }
 }
 
-/// The values that a shell completes after `--model`. The option also accepts surfaces of other degrees.
-const MODELS: [&str; 10] = [
-    "auto",
-    "linear",
-    "curve",
-    "poly13",
-    "observer",
-    "observer+rest",
-    "history",
-    "history+rest",
-    "diagnosed",
-    "diagnosed+rest",
-];
+/// Returns the names that a shell completes after `--model`, which takes further degrees of a surface.
+fn models() -> Vec<String> {
+    let named = ModelKind::named().into_iter().map(|kind| kind.to_string());
+    ["auto", "curve"].map(str::to_owned).into_iter().chain(named).collect()
+}
 
 /// A model, or the automatic choice of one.
 #[derive(Debug, Clone, Copy, PartialEq)]

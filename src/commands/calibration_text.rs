@@ -1,7 +1,5 @@
 //! A calibration as text on a terminal.
 
-use std::ops::RangeInclusive;
-
 use stretch_calibrate::{Calibrated, Candidate, FitReport, MODELS_IN_WORDS, ModelChoice, ModelRow};
 use stretch_data::unit_of;
 use stretch_report::{order_table, signal_table};
@@ -14,8 +12,8 @@ use crate::table::{maybe, number, table, table_text};
 /// model.
 const SQUARED_EXCESS: &str = "MSE above best";
 
-/// Indices of the columns that hold the errors on one kind of trial each.
-const KINDS: RangeInclusive<usize> = 2..=4;
+/// Headings of the columns for single kinds of trial.
+const KINDS: [&str; 3] = ["arbitrary", "pulses", "ramps"];
 
 /// Prints the models that `auto` compared. Columns without values are left out.
 pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
@@ -46,9 +44,9 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
     let header = [
         "model",
         "all",
-        "arbitrary",
-        "pulses",
-        "ramps",
+        KINDS[0],
+        KINDS[1],
+        KINDS[2],
         "delay ms",
         "worst",
         "coefficients",
@@ -59,11 +57,12 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
     let rows: Vec<Vec<String>> = choice.rows.iter().map(row).collect();
     let has_values = |i: &usize| rows.iter().any(|row| row.get(*i).is_some_and(|cell| cell != "-"));
     // with trials of one kind only, the column of that kind repeats the first one
-    let has_kinds = KINDS.filter(has_values).count() > 1;
+    let is_kind = |i: &usize| KINDS.contains(&header[*i]);
+    let has_kinds = (0..header.len()).filter(|i| is_kind(i) && has_values(i)).count() > 1;
     let is_shown = |i: &usize| {
         has_values(i)
             && (is_verbose() || header[*i] != SQUARED_EXCESS)
-            && (has_kinds || !KINDS.contains(i))
+            && (has_kinds || !is_kind(i))
     };
     let columns: Vec<usize> = (0..header.len()).filter(is_shown).collect();
     let picked = |row: &Vec<String>| columns.iter().filter_map(|i| row.get(*i).cloned()).collect();

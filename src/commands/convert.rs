@@ -104,18 +104,19 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             log.name
         );
     }
-    let kept = |name: &str| args.columns.is_empty() || args.columns.iter().any(|c| c.old == name);
-    let dropped: Vec<_> =
-        log.channels.iter().map(|c| c.name.as_str()).filter(|n| !kept(n)).collect();
-    if !dropped.is_empty() {
-        let (dropped, first) = (dropped.join(", "), dropped[0]);
-        tell(format!("left out: {dropped}; --column {first}={first} keeps a column"))?;
-    }
     let start_s = if args.from_zero { log.time_s[0] } else { 0.0 };
     let largest_s = log.time_s.iter().fold(0.0, |most: f64, t| most.max(t.abs()));
     log.time_s.iter_mut().for_each(|t| *t = tidy_time(*t - start_s, largest_s));
     let trial = Trial { channels, ..log };
     trial.write(&args.out).context("nothing was written")?;
+    // Without --column, no channel is left here.
+    let is_left_out = |channel: &&Channel| args.columns.iter().all(|c| c.old != channel.name);
+    let left_out = log.channels.iter().filter(is_left_out);
+    let left_out: Vec<_> = left_out.map(|channel| channel.name.as_str()).collect();
+    if let [first, ..] = left_out[..] {
+        let names = left_out.join(", ");
+        tell(format!("left out: {names}; --column {first}={first} keeps a column"))?;
+    }
     let names: Vec<_> = trial.channels.iter().map(|c| c.name.as_str()).collect();
     tell(format!("wrote {}: {} samples of {}", args.out.display(), trial.len(), names.join(", ")))
 }

@@ -58,7 +58,7 @@ pub(crate) struct Args {
         value_name = "FORM",
         requires = "c",
         hide_possible_values = true,
-        value_parser = Completed { names: &["fixed", "float"], parser: str::parse::<Form> }
+        value_parser = Completed { names: forms, parser: str::parse::<Form> }
     )]
     form: Option<Form>,
     /// File of integers to write: converter codes in, thousandths of the reference's unit out
@@ -73,6 +73,10 @@ pub(crate) struct Args {
     /// Check the file and renew its seal, after a hand edit or from an earlier release
     #[arg(long, conflicts_with_all = ["c", "fixed"])]
     seal: bool,
+}
+
+fn forms() -> Vec<String> {
+    [Form::Fixed, Form::Float].map(|form| form.to_string()).into()
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {

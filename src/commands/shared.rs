@@ -27,7 +27,7 @@ pub(crate) use crate::display::{detail, give_stdout, say, say_as_is, say_first, 
 /// A parser of values that a shell completes with `names`, although it accepts further values.
 #[derive(Clone)]
 pub(crate) struct Completed<P> {
-    pub(crate) names: &'static [&'static str],
+    pub(crate) names: fn() -> Vec<String>,
     pub(crate) parser: P,
 }
 
@@ -44,7 +44,7 @@ impl<P: TypedValueParser> TypedValueParser for Completed<P> {
     }
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
-        Some(Box::new(self.names.iter().map(PossibleValue::new)))
+        Some(Box::new((self.names)().into_iter().map(PossibleValue::new)))
     }
 }
 

@@ -4,7 +4,7 @@ use stretch_calibrate::{Calibrated, Candidate, Comparison, Evaluation, FitReport
 use stretch_core::Model;
 
 use super::{
-    markup::{NONE, fixed, number, with_unit},
+    markup::{NONE, fixed, labelled, number, with_unit},
     page::Table,
 };
 
@@ -46,7 +46,7 @@ pub fn method_table(
     names: &[String],
     unit: &str,
 ) -> Table {
-    let rmse = if unit.is_empty() { "RMSE".to_owned() } else { format!("RMSE, {unit}") };
+    let rmse = labelled("RMSE", unit);
     let largest = with_unit("Largest error,", unit);
     let head = [
         "Method",

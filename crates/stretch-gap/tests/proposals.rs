@@ -44,20 +44,24 @@ fn is_near(found: f64, expected: f64) -> bool {
     (found / expected - 1.0).abs() < testkit::tolerance::PLANTED_TERM
 }
 
+/// A square about the end of the range is one term. Gain and offset of the simulator may take a part of it, at the price of their tolerances.
+/// In one record of ten they take so much that a knee in the middle of the range explains the rest as well.
 #[test]
 fn a_square_is_proposed_as_a_square() {
-    let proposed = found(1, |x| x.iter().map(|x| 0.3 * x * x).collect());
-    let [term] = &proposed.terms[..] else { panic!("{}", proposed.equation) };
-    assert_eq!(term.form.passage, Passage::Direct, "{}", proposed.equation);
-    // A knee as near to the end of the range as shapes are refined is the same.
-    let is_square = match term.form.factors[..] {
-        [Factor::Power { signal: 0, power }] => power == 2.0,
-        [Factor::Above { signal: 0, at, power }] => power == 2.0 && at < 0.002,
-        _ => false,
+    let is_square = |seed: &u64| {
+        let proposed = found(*seed, |x| x.iter().map(|x| 0.3 * x * x).collect());
+        let [term] = &proposed.terms[..] else { panic!("{}", proposed.equation) };
+        assert_eq!(term.form.passage, Passage::Direct, "{}", proposed.equation);
+        // A knee as near to the end of the range as shapes are refined is the same.
+        let is_square = match term.form.factors[..] {
+            [Factor::Power { signal: 0, power }] => power == 2.0,
+            [Factor::Above { signal: 0, at, power }] => power == 2.0 && at < 0.002,
+            _ => false,
+        };
+        is_square && is_near(term.coefficient, 0.3)
     };
-    assert!(is_square, "{}", proposed.equation);
-    // Gain and offset may take a part of a square, at the price of their tolerances.
-    assert!(is_near(term.coefficient, 0.3), "{}", proposed.equation);
+    let squares = (1..=10).filter(is_square).count();
+    assert!(squares >= 9, "{squares} of 10");
 }
 
 /// A spring that stiffens on either side of where it is slack is one term, not a sine and a memory.

@@ -461,19 +461,24 @@ mod tests {
         approx::assert_abs_diff_eq!(trimmed_mean(1.0), 1.0, epsilon = 1e-12);
     }
 
-    /// A stated level is kept if the recording confirms it, and replaced otherwise.
+    /// A stated level is kept if the recording confirms it, and replaced otherwise. The price of a free level is ln(N)/2 nats.
+    /// A true level is therefore replaced if chance moves the estimate by sqrt(ln N) = 3 standard deviations. This happens in
+    /// about 1 % of recordings, because the trimmed mean varies more than the likelihood assumes.
     #[test]
     fn what_is_stated_is_a_hypothesis() {
+        let mut replaced = 0;
         for seed in 0..20 {
             let windows = windows(&Noise::known(1.0), 100, seed);
             let borne = Noise::of_windows(&windows, Some(1.0), true, 0.01).expect("enough windows");
-            assert_eq!(borne, Noise::known(1.0), "seed {seed}");
-            for stated in [Some(1.3), Some(30.0), None] {
+            replaced += usize::from(borne != Noise::known(1.0));
+            for stated in [Some(1.0), Some(1.3), Some(30.0), None] {
                 let other =
                     Noise::of_windows(&windows, stated, true, 0.01).expect("enough windows");
                 approx::assert_relative_eq!(other.sd(), 1.0, max_relative = NOISE_LEVEL);
             }
         }
+        // More than two of 20 have a probability of 0.001.
+        assert!(replaced <= 2, "{replaced} of 20");
     }
 
     #[test]

@@ -85,8 +85,9 @@ pub(crate) fn judge(case: &Case<'_>, thresholds: &Thresholds) -> Judged {
         return Judged { kind: Record, seen: Record, overruled: None, seen_naming };
     }
     let seen = seen(case, thresholds);
-    let would_name = matches!(seen, Effect | Partial);
-    let too_little = case.too_little.filter(|_| would_name).map(Overruled::TooLittle);
+    // The set of an effect can lose to an unknown cause only because the recording is short.
+    let needs_more = matches!(seen, Effect | Partial | Unknown);
+    let too_little = case.too_little.filter(|_| needs_more).map(Overruled::TooLittle);
     let overruled = at_bounds(case).or(too_little);
     let kind = if overruled.is_some() { Unknown } else { seen };
     Judged { kind, seen, overruled, seen_naming: naming(case, seen, thresholds) }

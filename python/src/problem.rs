@@ -296,9 +296,9 @@ impl<T: Send + 'static> Work<T> {
             let started = Workers::start(spec.clone(), session);
             return Ok(Arc::new(started.map_err(|e| e.to_string())?));
         }
-        let How { answers_all, batch, takes_inputs, .. } = self.how;
+        let How { answers_all, takes_inputs, .. } = self.how;
         let main_thread = self.main_thread.clone();
-        Ok(Arc::new(Asked { main_thread, answers_all, batch, takes_inputs }))
+        Ok(Arc::new(Asked { main_thread, answers_all, takes_inputs }))
     }
 }
 

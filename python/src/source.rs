@@ -57,7 +57,6 @@ pub(crate) struct Asked<T> {
     /// Messages to the main thread.
     pub(crate) main_thread: Sender<Message<T>>,
     pub(crate) answers_all: bool,
-    pub(crate) batch: usize,
     pub(crate) takes_inputs: bool,
 }
 
@@ -95,10 +94,6 @@ impl<T: Send> Source for Asked<T> {
 
     fn takes_inputs_of_several(&self) -> bool {
         self.takes_inputs
-    }
-
-    fn batch(&self) -> usize {
-        self.batch
     }
 }
 

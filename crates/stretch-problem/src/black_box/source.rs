@@ -211,12 +211,6 @@ pub trait Source: Send + Sync {
         false
     }
 
-    /// Number of requests per call at which the source is efficient. It is more than one if a batch costs little more
-    /// than a single run.
-    fn batch(&self) -> usize {
-        1
-    }
-
     /// Notes on the runs so far, such as restarted workers, in sentences.
     fn notes(&self) -> Vec<String> {
         Vec::new()

@@ -295,10 +295,6 @@ impl Source for Workers {
         self.hello.several
     }
 
-    fn batch(&self) -> usize {
-        self.hello.batch.saturating_mul(self.spec.jobs)
-    }
-
     fn notes(&self) -> Vec<String> {
         let restarts = self.restarts.load(Ordering::Relaxed);
         let note = format!(

@@ -32,10 +32,10 @@ pub enum ProblemError {
         /// The known names.
         known: String,
     },
-    /// A value is not allowed.
+    /// A value is not allowed, or the values of a column are not plausible.
     #[error("{owner}: {found}; {hint}")]
     Value {
-        /// Entry that holds the value.
+        /// Entry or column that holds the value.
         owner: String,
         /// What is wrong.
         found: String,
@@ -56,16 +56,6 @@ pub enum ProblemError {
         /// What is wrong in the file.
         #[source]
         cause: SimError,
-    },
-    /// The values of a column are not plausible.
-    #[error("{column}: {found}; {hint}")]
-    Implausible {
-        /// The column.
-        column: String,
-        /// What is wrong.
-        found: String,
-        /// What to do.
-        hint: String,
     },
     /// There are too few data to fit.
     #[error("{what}: {hint}")]
@@ -92,7 +82,7 @@ pub(crate) fn check_rate(dt_s: f64) -> Result<(), ProblemError> {
         return Ok(());
     }
     let hint = "rates from 0.001 to 10 000 000 Hz are understood; is the time in seconds?";
-    Err(ProblemError::implausible("time_s", format!("a sample every {dt_s} s"), hint))
+    Err(ProblemError::value("time_s", format!("a sample every {dt_s} s"), hint))
 }
 
 impl From<GridError> for ProblemError {
@@ -127,17 +117,9 @@ impl ProblemError {
         Self::Value { owner: owner.into(), found: found.into(), hint: hint.into() }
     }
 
-    pub(crate) fn implausible(
-        column: impl Into<String>,
-        found: impl Into<String>,
-        hint: impl Into<String>,
-    ) -> Self {
-        Self::Implausible { column: column.into(), found: found.into(), hint: hint.into() }
-    }
-
     /// Returns the error for a column that stays constant.
     pub(crate) fn dead(column: impl Into<String>, found: String) -> Self {
-        Self::implausible(column, found, "the channel is dead: check the sensor and its cable")
+        Self::value(column, found, "the channel is dead: check the sensor and its cable")
     }
 
     /// Returns the error for too few samples to fit.

@@ -107,7 +107,7 @@ impl GaugeSession {
             let column = format!("--reference {reference}, --signal {signal}");
             let hint =
                 "exchange them: the reference is the length, the signal is the output of the gauge";
-            return Err(ProblemError::implausible(column, "the two look swapped", hint));
+            return Err(ProblemError::value(column, "the two look swapped", hint));
         }
         let mut shares = Vec::new();
         for (name, values) in [(reference, &self.reference), (signal, &self.signal)] {

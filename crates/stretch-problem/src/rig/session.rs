@@ -208,9 +208,8 @@ impl RigSession {
     fn check_units(&self) -> Result<(), ProblemError> {
         let length = self.range(|t| &t.length_mm);
         let volts = self.range(|t| &t.bridge_v);
-        let bad = |column: &str, found: String, hint: &str| {
-            Err(ProblemError::implausible(column, found, hint))
-        };
+        let bad =
+            |column: &str, found: String, hint: &str| Err(ProblemError::value(column, found, hint));
         let spread = |(low, high): (f64, f64)| format!("values from {low} to {high}");
         if length.1 < 10.0 && volts.1 > 10.0 {
             let hint = "length_mm and bridge_v look swapped: exchange the two names";
@@ -270,7 +269,7 @@ fn excitation(one: &SessionTrial) -> Result<f64, ProblemError> {
     let is_sound = share > 0.0 && share <= 2.0 && shares.iter().all(|s| *s == share);
     is_sound.then_some(share).ok_or_else(|| {
         let (low, high) = ends(shares);
-        ProblemError::implausible(
+        ProblemError::value(
             format!("{}, {EXCITATION}", one.trial.name),
             format!("values from {low} to {high}"),
             "give the share of the nominal excitation, one number in every row of a trial",
@@ -322,7 +321,7 @@ impl RigSession {
             });
             let (column, hint) = directions::against(&motions.collect::<Vec<_>>(), self.dt_s);
             let found = "the muscle lengthens while the inlet is open";
-            return Err(ProblemError::implausible(column, found, hint));
+            return Err(ProblemError::value(column, found, hint));
         }
         Ok(())
     }

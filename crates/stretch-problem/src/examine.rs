@@ -3,11 +3,7 @@
 
 use std::{fmt, sync::atomic::AtomicUsize};
 
-use schemars::{
-    JsonSchema, Schema,
-    generate::SchemaSettings,
-    transform::{Transform, transform_subschemas},
-};
+use schemars::{JsonSchema, Schema, generate::SchemaSettings, transform::RecursiveTransform};
 use serde::Serialize;
 use serde_json::{Value, json};
 use stretch_data::{RigFile, Trial};
@@ -162,27 +158,22 @@ impl Examined {
 /// assert_eq!(schema["$defs"]["Closed"]["properties"]["share"]["type"][0], "null");
 /// ```
 pub fn diagnosis_schema() -> Value {
-    let settings = SchemaSettings::draft2020_12().for_serialize().with_transform(NumbersMayBeNull);
+    let settings = SchemaSettings::draft2020_12()
+        .for_serialize()
+        .with_transform(RecursiveTransform(numbers_may_be_null));
     settings.into_generator().into_root_schema_for::<Written<'_>>().to_value()
 }
 
-/// Transform that allows null for every number, because a number that is not finite is written as
-/// null.
-#[derive(Debug, Clone)]
-struct NumbersMayBeNull;
-
-impl Transform for NumbersMayBeNull {
-    fn transform(&mut self, schema: &mut Schema) {
-        transform_subschemas(self, schema);
-        schema.remove("format");
-        // examples in Rust help no reader of JSON
-        if let Some(Value::String(words)) = schema.get_mut("description") {
-            let end = words.find("\n\n```").unwrap_or(words.len());
-            *words = words[..end].replace('\n', " ");
-        }
-        if schema.get("type").is_some_and(|kind| kind == "number") {
-            schema.insert("type".into(), json!(["null", "number"]));
-        }
+/// Allows null for a number, because a number that is not finite is written as null.
+fn numbers_may_be_null(schema: &mut Schema) {
+    schema.remove("format");
+    // examples in Rust help no reader of JSON
+    if let Some(Value::String(words)) = schema.get_mut("description") {
+        let end = words.find("\n\n```").unwrap_or(words.len());
+        *words = words[..end].replace('\n', " ");
+    }
+    if schema.get("type").is_some_and(|kind| kind == "number") {
+        schema.insert("type".into(), json!(["null", "number"]));
     }
 }
 

@@ -139,7 +139,7 @@ fn outputs_of(name: &str) -> String {
 /// Values of a wrapper that acts in every run, in the order of its parameters.
 fn values_of(wrapper: &Placed, known: &EffectEntry) -> Result<Vec<f64>, ProblemError> {
     let owner = || format!("[[wrapped]] {}", known.name);
-    let parameters = wrapper.parameters();
+    let parameters = &wrapper.parameters;
     let names = || parameters.iter().map(|p| &*p.name);
     if let Some(name) = known.parameters.keys().find(|name| names().all(|n| n != name.as_str())) {
         return Err(ProblemError::unknown(owner(), "parameter", name, names()));

@@ -67,7 +67,7 @@ fn probe(problem: &Checked, stage: usize, input: usize) -> Option<Altered> {
     let mut columns: Vec<Vec<f64>> = problem.stage_inputs(stage).map(<[f64]>::to_vec).collect();
     let mut most = (0.0, Vec::new(), Vec::new());
     for (at, wrapper) in acting(problem).filter(|(_, w)| is_at(w, stage, input)) {
-        for values in wrapper.starts() {
+        for values in &wrapper.starts {
             let (mut altered, mut before) = (columns[input].clone(), problem.before[stage].clone());
             wrapper.act(values, &trials, &mut before, &mut altered);
             let by = apart(&altered, &columns[input]);

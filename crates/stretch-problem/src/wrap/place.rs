@@ -41,9 +41,9 @@ pub(crate) struct Placed {
     pub(crate) name: String,
     extent: Extent,
     /// Its parameters, without those that are estimated from the recording.
-    parameters: Vec<EffectParameter>,
+    pub(crate) parameters: Vec<EffectParameter>,
     /// Values at which the search begins.
-    starts: Vec<Vec<f64>>,
+    pub(crate) starts: Vec<Vec<f64>>,
     /// The other channel that the wrapper depends on, all trials end to end.
     beside: Option<Arc<Vec<f64>>>,
     /// The channel that loads the contact, all trials end to end, with its name and unit.
@@ -339,16 +339,6 @@ impl Placed {
     /// The other column that the wrapper reads.
     pub(crate) fn other(&self) -> Option<&str> {
         self.load.as_ref().map(|(_, name)| name.as_str())
-    }
-
-    /// The parameters of the wrapper, with their ranges.
-    pub(crate) fn parameters(&self) -> &[EffectParameter] {
-        &self.parameters
-    }
-
-    /// Values at which the search for the wrapper begins.
-    pub(crate) fn starts(&self) -> &[Vec<f64>] {
-        &self.starts
     }
 
     /// The wrapper as an effect of the catalogue.

@@ -51,7 +51,7 @@ pub struct Checked {
     pub(crate) grid: Grid,
     /// Samples and session time of each trial, s, from the session's start.
     pub(crate) parts: Vec<(Range<usize>, f64)>,
-    notes: Vec<String>,
+    pub(crate) notes: Vec<String>,
 }
 
 impl Checked {
@@ -156,12 +156,6 @@ impl Checked {
     /// Stages, parameters, effects and trials as the diagnosis takes them.
     pub fn description(&self) -> &Description {
         &self.about
-    }
-
-    /// Adds a note.
-    pub(crate) fn noting(mut self, note: &str) -> Self {
-        self.notes.push(note.to_owned());
-        self
     }
 
     /// Notes on what was done to the recordings and which effects are not looked for, in sentences.

@@ -128,7 +128,7 @@ impl Workers {
         bare.wrap.retain(|name| !name.starts_with("state."));
         let mut checked = Checked::new(bare)?;
         let mut source = Self::start(workers.clone(), checked.session())?;
-        let mut spec = spec.with_states(source.states())?;
+        let spec = spec.with_states(source.states())?;
         if spec.effects.len() > checked.session().effects.len() {
             // the session that the first worker received lacks the effects on its states
             drop(source);
@@ -138,8 +138,8 @@ impl Workers {
         if !source.takes_inputs()
             && let Some(behind) = spec.only_behind()
         {
-            spec = behind;
-            checked = Checked::new(spec)?.noting(ONLY_BEHIND);
+            checked = Checked::new(behind)?;
+            checked.notes.push(ONLY_BEHIND.to_owned());
         }
         Ok((checked, source))
     }

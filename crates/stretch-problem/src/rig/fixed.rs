@@ -8,6 +8,7 @@ use stretch_sim::{EffectParameter, Grid, Rig};
 use super::{
     RigSimulator,
     nominal::{TunedParameter, TunedRig},
+    rails::rails,
 };
 use crate::{
     fix::{Chosen, Fix, Fixed, NoFix, names, with_line},
@@ -21,7 +22,7 @@ impl Diagnosable for RigSimulator {
     }
 
     fn afterwards(&self) -> Vec<String> {
-        self.rails()
+        rails(&self.base, &self.session)
     }
 
     fn next(

@@ -1,9 +1,10 @@
 //! Channels that are saturated at an end of the recorder's range.
 
+use stretch_data::ends;
 use stretch_filter::log::{noise_of_differences, second_differences};
 use stretch_sim::{Key, RigParams};
 
-use super::{RigSession, RigSimulator, RigTrial};
+use super::{RigSession, RigTrial};
 
 /// Share of the samples at one value above which chance does not explain the repeated value.
 const SHARE: f64 = 0.002;
@@ -11,14 +12,8 @@ const SHARE: f64 = 0.002;
 /// value at rest.
 const NOISY: f64 = 0.3;
 
-impl RigSimulator {
-    /// A sentence for every end of a channel that holds more samples than noise explains.
-    pub fn rails(&self) -> Vec<String> {
-        rails(self.nominal(), self.session())
-    }
-}
-
-fn rails(params: &RigParams, session: &RigSession) -> Vec<String> {
+/// A sentence for every end of a channel that holds more samples than noise explains.
+pub(super) fn rails(params: &RigParams, session: &RigSession) -> Vec<String> {
     type Channel = fn(&RigTrial) -> Option<&[f64]>;
     let channels: [(&str, &str, f64, Channel); 3] = [
         ("bridge_v", "V", params[Key::SigmaV], |t| Some(t.bridge_v())),
@@ -28,8 +23,7 @@ fn rails(params: &RigParams, session: &RigSession) -> Vec<String> {
     let mut said = Vec::new();
     for (column, unit, sigma, of) in channels {
         let values: Vec<f64> = session.trials().iter().filter_map(of).flatten().copied().collect();
-        let low = values.iter().copied().fold(f64::INFINITY, f64::min);
-        let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let (low, high) = ends(&values);
         for (end, which) in [(low, "least"), (high, "greatest")] {
             let share =
                 values.iter().filter(|v| **v == end).count() as f64 / values.len().max(1) as f64;

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use stretch_data::ends;
 use stretch_gap::TrialSpec;
 
 /// Samples that are fitted together, as indices into all trials end to end.
@@ -46,9 +47,7 @@ pub(super) fn by_column(name: &str, values: &[f64], trials: &[TrialSpec]) -> Vec
         samples[bounds.partition_point(|bound| bound <= value)].push(i);
     }
     let group = |samples: Vec<usize>| {
-        let of = samples.iter().map(|i| values[*i]);
-        let [low, high] =
-            of.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(x), b.max(x)]);
+        let (low, high) = ends(samples.iter().map(|i| &values[*i]));
         Group { name: group_name(name, low, high), samples }
     };
     samples.into_iter().filter(|samples| samples.len() >= FEWEST).map(group).collect()

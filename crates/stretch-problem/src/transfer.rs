@@ -54,7 +54,8 @@ pub(crate) fn transfer(
     let dt_s = simulator.dt_s();
     let trained = [&real, retuned, best].map(|records| trials(records, roles, dt_s, false));
     let tested = trials(&real, roles, dt_s, true);
-    let scale = span(trained[0].iter().flat_map(|t| &t.channels[0].values));
+    let (low, high) = ends(trained[0].iter().flat_map(|t| &t.channels[0].values));
+    let scale = high - low;
     let kinds = [ModelKind::Linear, ModelKind::Surface(Degree::POLY13)];
     let jobs: Vec<_> = kinds.iter().flat_map(|k| trained.iter().map(move |t| (*k, t))).collect();
     let errors: Result<Vec<f64>, CalibrateError> =
@@ -175,9 +176,4 @@ fn error(kind: ModelKind, trained: &[Trial], tested: &[Trial]) -> Result<f64, Ca
         }
     }
     Ok((sum / count as f64).sqrt())
-}
-
-fn span<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
-    let (low, high) = ends(values);
-    high - low
 }

@@ -9,7 +9,7 @@ use stretch_sim::{
 };
 
 use super::{
-    RigSimulator, nominal::TunedRig, reference_sensor::ReferenceSensor, session::Begin,
+    RigSimulator, RigTrial, nominal::TunedRig, reference_sensor::ReferenceSensor, session::Begin,
     smooth::cubic, timing, timing::Leads,
 };
 use crate::{bench::acting::Acting, error::ProblemError};
@@ -379,14 +379,13 @@ impl Setting<'_> {
     /// For each trial, the sensing stage if the excitation of the bridge is not the usual one,
     /// otherwise `None`. All trials share the memory of the gauge.
     fn dimmed(&self, count: usize) -> Result<Vec<Option<Sensing>>, ProblemError> {
-        let one = |excitation: f64| -> Result<Option<Sensing>, ProblemError> {
+        let one = |trial: &RigTrial| {
             let mut params = self.params;
-            params[Key::VExc] *= excitation;
-            let is_usual = excitation == 1.0;
-            let stage = || Sensing::new(&params, &self.effects, &self.grid);
-            Ok(if is_usual { None } else { Some(stage()?) })
+            params[Key::VExc] *= trial.excitation;
+            let stage = || Ok(Sensing::new(&params, &self.effects, &self.grid)?);
+            (trial.excitation != 1.0).then(stage).transpose()
         };
-        self.rig.session.trials[..count].iter().map(|t| one(t.excitation)).collect()
+        self.rig.session.trials[..count].iter().map(one).collect()
     }
 
     /// Samples at every node of the grid, interpolated by cubics through four samples.

@@ -73,10 +73,8 @@ impl SimulatorEntry {
         let given = serde_json::to_value(self).unwrap_or_default();
         let given = given.as_object().into_iter().flatten().filter(|(_, value)| !value.is_null());
         let given: Vec<&str> = given.map(|(key, _)| key.as_str()).collect();
-        let kinds =
-            ["builtin", "command", "python", "fmu"].map(|kind| (kind, given.contains(&kind)));
-        let kinds: Vec<&str> =
-            kinds.into_iter().filter_map(|(kind, is)| is.then_some(kind)).collect();
+        let mut kinds = vec!["builtin", "command", "python", "fmu"];
+        kinds.retain(|kind| given.contains(kind));
         let [kind] = kinds[..] else {
             return match kinds[..] {
                 [_, second, ..] => {

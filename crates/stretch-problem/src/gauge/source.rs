@@ -47,8 +47,6 @@ impl GaugeSimulator {
         let Some((reference, signal)) = columns_of(&first.trial, columns, says_so)? else {
             return Ok(None);
         };
-        let (reference, signal) = (reference.to_owned(), signal.to_owned());
-        let (reference, signal) = (reference.as_str(), signal.as_str());
         let trials = match &set {
             // The recording is read once, because it may be standard input.
             None => vec![SessionTrial::from(first)],

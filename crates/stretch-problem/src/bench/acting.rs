@@ -1,8 +1,12 @@
 //! Divides the effects of a model into effects that stages simulate and effects whose values are
 //! estimated from the recording.
 
+use std::ops::Range;
+
 use stretch_gap::{Line, Model, SampleRoles, TrialSpec};
 use stretch_sim::{Effect, EffectSet, Find, Measured, SimError};
+
+use super::trials::ranges;
 
 /// The measured samples of a channel outside the test samples, from which effects may be estimated.
 #[derive(Debug, Clone)]
@@ -15,13 +19,10 @@ pub(crate) struct FitRecord {
 impl FitRecord {
     /// The fit samples of a channel that holds all trials end to end.
     pub(crate) fn of(trials: &[TrialSpec], measured: &[f64], dt_s: f64) -> Self {
-        let mut begin = 0;
-        let part = |(trial, fit): (&TrialSpec, usize)| {
-            let from = begin;
-            begin += trial.samples;
-            measured[from..from + fit].to_vec()
-        };
-        Self { parts: trials.iter().zip(SampleRoles::not_tested(trials)).map(part).collect(), dt_s }
+        let parts = ranges(trials).into_iter().zip(SampleRoles::not_tested(trials));
+        let part =
+            |(all, fit): (Range<usize>, usize)| measured[all.start..all.start + fit].to_vec();
+        Self { parts: parts.map(part).collect(), dt_s }
     }
 
     /// The samples of all trials.

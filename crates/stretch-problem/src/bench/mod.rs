@@ -7,4 +7,5 @@ pub(crate) mod isolated_outliers;
 pub(crate) mod rig_file;
 pub(crate) mod shortened;
 pub(crate) mod specs;
+pub(crate) mod trials;
 pub(crate) mod undetermined;

@@ -3,10 +3,13 @@
 use std::ops::Range;
 
 use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, Split};
-use stretch_gap::{SampleRoles, TrialSpec};
+use stretch_gap::TrialSpec;
 
 use super::spec::StageEntry;
-use crate::error::ProblemError;
+use crate::{
+    bench::trials::{column, looked_at, ranges, specs},
+    error::ProblemError,
+};
 
 /// Bounds of the least number of samples of a part of a trial. The least number is the number of samples in five
 /// seconds, limited to these bounds. Shorter parts are left out.
@@ -51,22 +54,13 @@ impl Columns {
                 "record at least 10 s to fit and 5 s to test on, without gaps",
             ));
         }
-        let all = |column: usize| -> Vec<f64> {
-            session.trials().iter().flat_map(|t| t.columns()[column].iter().copied()).collect()
-        };
-        let spec = |trial: &EvenTrial| TrialSpec {
-            name: trial.name().to_owned(),
-            samples: trial.columns()[0].len(),
-            start_s: trial.start_s(),
-            is_test: trial.is_test(),
-        };
         let is_lost: Vec<bool> =
             session.trials().iter().flat_map(|t| t.is_lost().iter().copied()).collect();
         Ok(Self {
-            values: (0..names.len()).map(all).collect(),
+            values: (0..names.len()).map(|at| column(&session, at)).collect(),
             names,
             turns: session.turns().to_vec(),
-            trials: session.trials().iter().map(spec).collect(),
+            trials: specs(&session),
             sources: session.trials().iter().map(EvenTrial::source).collect(),
             is_lost: if is_lost.iter().any(|lost| *lost) { is_lost } else { Vec::new() },
             dt_s: session.dt_s(),
@@ -124,25 +118,11 @@ impl Columns {
 
     /// Range of samples of every trial.
     pub(crate) fn ranges(&self) -> Vec<Range<usize>> {
-        let mut end = 0;
-        let one = |trial: &TrialSpec| {
-            end += trial.samples;
-            end - trial.samples..end
-        };
-        self.trials.iter().map(one).collect()
+        ranges(&self.trials)
     }
 
     /// Ranges of the samples outside the test samples.
     pub(crate) fn looked_at(&self) -> Vec<Range<usize>> {
-        let fit = SampleRoles::not_tested(&self.trials);
-        let parts = self.ranges().into_iter().zip(fit);
-        parts.map(|(all, fit)| all.start..all.start + fit).filter(|r| !r.is_empty()).collect()
-    }
-
-    /// Time from the first to the last sample of the session, s.
-    pub(crate) fn session_s(&self) -> f64 {
-        let end_s = |t: &TrialSpec| t.start_s + t.samples as f64 * self.dt_s;
-        let begun_s = self.trials.first().map_or(0.0, |t| t.start_s);
-        self.trials.last().map_or(0.0, end_s) - begun_s
+        looked_at(&self.trials)
     }
 }

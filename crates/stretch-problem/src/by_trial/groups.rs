@@ -1,9 +1,9 @@
 //! Divides samples into runs: one run for each trial, or one for each value of a column.
 
-use std::ops::Range;
-
 use stretch_data::ends;
 use stretch_gap::TrialSpec;
+
+use crate::bench::trials::ranges;
 
 /// Samples that are fitted together, as indices into all trials end to end.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,15 +57,6 @@ fn group_name(name: &str, low: f64, high: f64) -> String {
     let [low, high] = [low, high]
         .map(|x| format!("{:.4}", x).trim_end_matches('0').trim_end_matches('.').to_owned());
     if low == high { format!("{name} {low}") } else { format!("{name} {low} to {high}") }
-}
-
-fn ranges(trials: &[TrialSpec]) -> Vec<Range<usize>> {
-    let mut end = 0;
-    let one = |trial: &TrialSpec| {
-        end += trial.samples;
-        end - trial.samples..end
-    };
-    trials.iter().map(one).collect()
 }
 
 /// Bounds between the values of a column that is set.

@@ -6,10 +6,12 @@ mod fixed;
 mod session;
 mod source;
 
+use std::ops::Range;
+
 use stretch_data::SessionTrial;
 use stretch_gap::{
     Description, DescriptionSpec, GapError, Line, Model, Noise, ParameterSpec, Run, Simulator,
-    StageSpec, TrialSpec,
+    StageSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
@@ -22,6 +24,7 @@ use crate::{
     bench::{
         acting::{Acting, FitRecord, lines},
         specs::{Place, shown, spec as spec_of},
+        trials::{ranges, session_s},
     },
     error::ProblemError,
     rig::smooth::{Draws, Smoothed, unscheduled},
@@ -123,9 +126,11 @@ impl GaugeSimulator {
         let (least, greatest) = session.range(&session.signal);
         let (reference_noise, noise) =
             (session.noise(&session.reference), session.noise(&session.signal).sd());
-        let inputs: Vec<Smoothed> = parts(&session.trials, &session.reference)
-            .map(|(_, x)| Smoothed::of(x, reference_noise.sd(), &unscheduled(x.len())))
-            .collect();
+        let smooth = |range: Range<usize>| {
+            let allowed = unscheduled(range.len());
+            Smoothed::of(&session.reference[range], reference_noise.sd(), &allowed)
+        };
+        let inputs: Vec<Smoothed> = ranges(&session.trials).into_iter().map(smooth).collect();
         let alone = alone(&session);
         let has_pressure = nominal.spec.pressure_scale.is_some();
         let is_missing = |e: &&Effect| nominal.effects.find(e.name).is_none();
@@ -225,19 +230,6 @@ impl Simulator for GaugeSimulator {
     }
 }
 
-/// Trials with their part of a column.
-fn parts<'a>(
-    trials: &'a [TrialSpec],
-    values: &'a [f64],
-) -> impl Iterator<Item = (&'a TrialSpec, &'a [f64])> {
-    let mut rest = values;
-    trials.iter().map(move |trial| {
-        let (own, behind) = rest.split_at(trial.samples);
-        rest = behind;
-        (trial, own)
-    })
-}
-
 /// The gauge of a rig file. Without a rig file it is a gauge that is estimated from the recording, with offset and gain
 /// free.
 fn nominal(session: &GaugeSession, rig: Option<&GaugeRig>) -> GaugeRig {
@@ -273,11 +265,9 @@ fn parameters(rig: &GaugeRig, signal: &str, is_evidence: bool) -> Vec<ParameterS
 }
 
 fn alone(session: &GaugeSession) -> Alone {
-    let end_s = |t: &TrialSpec| t.start_s + t.samples as f64 * session.dt_s;
-    let begun_s = session.trials.first().map_or(0.0, |t| t.start_s);
     let longest = session.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
     Alone {
-        session_s: session.trials.last().map_or(0.0, end_s) - begun_s,
+        session_s: session_s(&session.trials, session.dt_s),
         lag_s: lag_s(&session.reference[longest.clone()], &session.signal[longest], session.dt_s),
     }
 }

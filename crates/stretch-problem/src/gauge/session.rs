@@ -2,11 +2,15 @@
 
 use std::ops::Range;
 
-use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, ends, unit};
-use stretch_gap::{Noise, SampleRoles, TrialSpec};
+use stretch_data::{EvenSession, Rows, SessionTrial, ends, unit};
+use stretch_gap::{Noise, TrialSpec};
 
 use crate::{
-    bench::{shortened::shortened, undetermined::undetermined},
+    bench::{
+        shortened::shortened,
+        trials::{column, looked_at, specs},
+        undetermined::undetermined,
+    },
     error::{ProblemError, check_rate},
 };
 
@@ -49,26 +53,11 @@ impl GaugeSession {
         }
         let session = EvenSession::new(&trials, &columns, SHORTEST)?;
         check_rate(session.dt_s())?;
-        let all = |column: usize| -> Vec<f64> {
-            session
-                .trials()
-                .iter()
-                .filter_map(|t| t.columns().get(column))
-                .flatten()
-                .copied()
-                .collect()
-        };
-        let spec = |trial: &EvenTrial| TrialSpec {
-            name: trial.name().to_owned(),
-            samples: trial.columns()[0].len(),
-            start_s: trial.start_s(),
-            is_test: trial.is_test(),
-        };
         let mut own = Self {
-            trials: session.trials().iter().map(spec).collect(),
-            reference: all(0),
-            signal: all(1),
-            pressure: all(2),
+            trials: specs(&session),
+            reference: column(&session, 0),
+            signal: column(&session, 1),
+            pressure: column(&session, 2),
             is_lost: session.trials().iter().flat_map(|t| undetermined(t.is_lost())).collect(),
             dt_s: session.dt_s(),
             rows: session.rows(),
@@ -80,12 +69,7 @@ impl GaugeSession {
 
     /// Ranges of the samples outside the test samples.
     pub(super) fn fitted(&self) -> impl Iterator<Item = Range<usize>> {
-        let mut begin = 0;
-        self.trials.iter().zip(SampleRoles::not_tested(&self.trials)).filter_map(move |(t, fit)| {
-            let own = begin..begin + fit;
-            begin += t.samples;
-            (fit > 0).then_some(own)
-        })
+        looked_at(&self.trials).into_iter()
     }
 
     /// Least and greatest value of a column over the trials that are fitted.

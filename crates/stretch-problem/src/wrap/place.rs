@@ -10,6 +10,7 @@ use stretch_effects::{
 use stretch_gap::EffectSpec;
 
 use crate::{
+    bench::trials::session_s,
     black_box::{begins::Before, columns::Columns},
     error::ProblemError,
 };
@@ -165,7 +166,10 @@ fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
     let looked: Vec<Vec<f64>> = among.columns.looked_at().into_iter().map(begun).collect();
     let extent = Extent::of(looked.iter().map(Vec::as_slice), among.columns.dt_s);
     if extent.span() > 0.0 {
-        return Ok(Extent { session_s: among.columns.session_s(), ..extent });
+        return Ok(Extent {
+            session_s: session_s(&among.columns.trials, among.columns.dt_s),
+            ..extent
+        });
     }
     Err(ProblemError::value(
         format!("column {column}"),

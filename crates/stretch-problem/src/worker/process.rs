@@ -4,7 +4,7 @@ use std::{
     collections::VecDeque,
     io::{BufRead, BufReader, Read, Write},
     path::Path,
-    process::{Command, Stdio},
+    process::{Command, ExitStatus, Stdio},
     sync::{
         Arc, Mutex, PoisonError,
         atomic::{AtomicU64, Ordering::SeqCst},
@@ -108,17 +108,22 @@ impl Process {
         }
     }
 
+    /// Waits for a short time until the worker ends; `None` if it still runs.
+    fn ended(&mut self) -> Option<ExitStatus> {
+        let until = Instant::now() + LEAVES;
+        loop {
+            let ended = self.group.child.try_wait().ok().flatten();
+            if ended.is_some() || Instant::now() >= until {
+                return ended;
+            }
+            thread::sleep(Duration::from_millis(5));
+        }
+    }
+
     /// The error of a worker: what happened, the exit status, and the last lines that the worker printed.
     pub(super) fn failed(&mut self, why: &str) -> String {
         // Lines that the worker printed as it died may still be under way.
-        let until = Instant::now() + LEAVES;
-        let mut ended = None;
-        while ended.is_none() && Instant::now() < until {
-            ended = self.group.child.try_wait().ok().flatten();
-            if ended.is_none() {
-                thread::sleep(Duration::from_millis(5));
-            }
-        }
+        let ended = self.ended();
         thread::sleep(Duration::from_millis(20));
         let mut text = why.to_owned();
         if let Some(status) = ended {
@@ -143,13 +148,7 @@ impl Drop for Process {
             // sender, the worker's standard input is closed.
             let _ = to.send(super::message::bye());
         }
-        let until = Instant::now() + LEAVES;
-        while Instant::now() < until {
-            match self.group.child.try_wait() {
-                Ok(None) => thread::sleep(Duration::from_millis(5)),
-                _ => break,
-            }
-        }
+        self.ended();
         // Dropping the group kills it, with all processes that the worker left behind.
     }
 }

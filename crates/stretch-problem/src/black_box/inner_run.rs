@@ -12,12 +12,7 @@ use super::{
 
 impl BlackBox {
     /// Wrappers that act on one side of a stage, in their order, with their values: wrappers of the
-    /// model, and wrappers that act in every run.
-    pub(super) fn acting<'a>(&'a self, run: &Run<'a>, side: Side) -> Vec<(usize, &'a Vec<f64>)> {
-        self.acting_at(run, run.stage, side)
-    }
-
-    /// As `acting`, for a stage other than the one that is run.
+    /// model, and wrappers that act in every run. The stage may be another than the one that is run.
     pub(super) fn acting_at<'a>(
         &'a self,
         run: &Run<'a>,

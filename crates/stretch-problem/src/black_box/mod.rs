@@ -199,7 +199,7 @@ impl BlackBox {
     /// Applies the wrappers behind a stage to its output.
     fn behind(&self, run: &Run<'_>, out: &mut [f64]) {
         let trials = self.trials_of();
-        for (at, values) in self.acting(run, Side::Output) {
+        for (at, values) in self.acting_at(run, run.stage, Side::Output) {
             let wrapper = &self.problem.wrappers[at];
             match wrapper.kind.find {
                 Some(find) => self.follow(find, run.stage, values, out),

@@ -81,9 +81,7 @@ impl GaugeSimulator {
         signal.iter_mut().for_each(|y| *y /= noise);
         Ok(vec![signal])
     }
-}
 
-impl GaugeSimulator {
     fn reference_of(&self, course: &Course) -> Vec<f64> {
         course.e.iter().map(|e| self.nominal.spec.zero + self.nominal.spec.span * e).collect()
     }

@@ -179,9 +179,7 @@ impl GaugeSimulator {
             ..self.nominal.spec
         }
     }
-}
 
-impl GaugeSimulator {
     /// The signal over the trials of a run.
     fn signal(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), ProblemError> {
         let acting = Acting::of(&self.nominal.effects, &self.rows, run.model)?;

@@ -6,16 +6,13 @@
 //! questions (several at once if several are waiting), calls the user's simulator, and handles
 //! Ctrl-C.
 
-use std::{
-    sync::mpsc::{self, Receiver, RecvTimeoutError, Sender},
-    time::Duration,
-};
+use std::sync::mpsc::{self, Receiver, Sender};
 
 use numpy::{PyArray1, PyArray2, PyReadonlyArray2, ndarray::Array2};
 use pyo3::{create_exception, exceptions::PyRuntimeError, prelude::*};
 use stretch_problem::{Ask, Source, SourceError};
 
-use crate::error::StretchError;
+use crate::{error::StretchError, watched::received};
 
 create_exception!(
     stretch,
@@ -23,9 +20,6 @@ create_exception!(
     StretchError,
     "Raised by a simulator that cannot simulate these values: the fit turns back and goes on elsewhere."
 );
-
-/// Interval at which Python signals are checked.
-const TICK: Duration = Duration::from_millis(50);
 
 /// One requested run, and the channel for its result.
 #[derive(Debug)]
@@ -114,21 +108,8 @@ pub(crate) fn serve<T: Send>(
     batch: usize,
 ) -> PyResult<T> {
     loop {
-        let waiting = &mut messages;
-        let first = match py.detach(move || waiting.recv_timeout(TICK)) {
-            Ok(message) => message,
-            Err(RecvTimeoutError::Timeout) => {
-                py.check_signals()?;
-                continue;
-            }
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(PyRuntimeError::new_err(
-                    "the work ended without an answer; this is an error of stretch: please report it",
-                ));
-            }
-        };
         let mut groups: Vec<Vec<Question>> = Vec::new();
-        let mut waiting: Vec<Message<T>> = vec![first];
+        let mut waiting: Vec<Message<T>> = vec![received(py, &mut messages)?];
         waiting.extend(messages.try_iter());
         for message in waiting {
             match message {

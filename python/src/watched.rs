@@ -1,7 +1,7 @@
 //! Work that can be interrupted with Ctrl-C.
 
 use std::{
-    sync::mpsc::{self, RecvTimeoutError},
+    sync::mpsc::{self, Receiver, RecvTimeoutError},
     thread,
     time::Duration,
 };
@@ -24,10 +24,15 @@ pub(crate) fn watched<T: Send + 'static>(
     let (send, mut answer) = mpsc::channel();
     // The channel is closed once the caller was interrupted.
     thread::Builder::new().name("stretch".into()).spawn(move || drop(send.send(work())))?;
+    received(py, &mut answer)
+}
+
+/// Waits for a message without the interpreter lock, and checks Python signals meanwhile.
+pub(crate) fn received<T: Send>(py: Python<'_>, messages: &mut Receiver<T>) -> PyResult<T> {
     loop {
-        let answer = &mut answer;
-        match py.detach(move || answer.recv_timeout(TICK)) {
-            Ok(done) => return Ok(done),
+        let messages = &mut *messages;
+        match py.detach(move || messages.recv_timeout(TICK)) {
+            Ok(message) => return Ok(message),
             Err(RecvTimeoutError::Timeout) => py.check_signals()?,
             Err(RecvTimeoutError::Disconnected) => {
                 return Err(PyRuntimeError::new_err(

@@ -93,17 +93,10 @@ impl Checked {
         let among = Among {
             columns: &columns,
             before: &before,
-            stages: stages.iter().map(|s| s.name.as_str()).collect(),
+            stages,
             velocities: &velocities,
             positions: &positions,
             names_motion: spec.stages.iter().map(names_motion).collect(),
-            moving: stages
-                .iter()
-                .flat_map(|s| s.velocity.iter().chain(&s.position))
-                .map(String::as_str)
-                .collect(),
-            inputs: stages.iter().map(|s| s.inputs.len()).collect(),
-            others: columns.names.clone(),
             kinds: &spec.kinds,
         };
         let around = Around::of(&spec, &sites(stages, inputs, &unit_of), &among, &mut notes)?;

@@ -11,7 +11,7 @@ use stretch_gap::EffectSpec;
 
 use crate::{
     bench::trials::session_s,
-    black_box::{begins::Before, columns::Columns},
+    black_box::{StageEntry, begins::Before, columns::Columns},
     error::ProblemError,
 };
 
@@ -57,8 +57,7 @@ pub(crate) struct Among<'a> {
     pub(crate) columns: &'a Columns,
     /// By stage, the commands with which the operators in front of it begin each trial.
     pub(crate) before: &'a [Before],
-    /// Names of the stages.
-    pub(crate) stages: Vec<&'a str>,
+    pub(crate) stages: &'a [StageEntry],
     /// By stage, the velocity of its parts with friction.
     pub(crate) velocities: &'a [Option<Vec<f64>>],
     /// By stage, the position of its parts with friction.
@@ -66,12 +65,6 @@ pub(crate) struct Among<'a> {
     /// By stage, whether it names the velocity or the position of its parts with friction.
     /// Otherwise its output is used.
     pub(crate) names_motion: Vec<bool>,
-    /// Columns of velocities and positions, which are not loads of a contact.
-    pub(crate) moving: Vec<&'a str>,
-    /// By stage, the number of its inputs.
-    pub(crate) inputs: Vec<usize>,
-    /// Columns that may cause crosstalk in a channel or load a contact.
-    pub(crate) others: Vec<String>,
     /// The user's own kinds, which act after the kinds of the catalogue.
     pub(crate) kinds: &'a [&'static Kind],
 }
@@ -100,7 +93,7 @@ pub(crate) fn placed(
                 _ if !is_asked(usual) => None,
                 true => lack(kind, site, sites, among),
                 false => (!is_asked(is_usual(kind, site, among))).then(|| {
-                    let stage = among.stages[site.stage];
+                    let stage = &among.stages[site.stage].name;
                     format!(
                         "{} is not looked for at {}, because a lag of the output has the same effect; name velocity or position in stage {stage}",
                         kind.title, site.column
@@ -209,7 +202,8 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
             aliases: aliases((kind, is_usual(kind, site, among)), site, among, &label),
         }
     };
-    let others = || among.others.iter().filter(|other| *other != own);
+    // columns that may cause crosstalk in a channel or load a contact
+    let others = || among.columns.names.iter().filter(|other| *other != own);
     let moves = |x: &[f64]| {
         let [low, high]: [f64; 2] = range_of(x);
         high > low
@@ -230,14 +224,16 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
     if matches!(kind.beside, Beside::Velocity | Beside::Position) {
         return vec![with(Some(rubs), None)];
     }
-    let loads = others().filter(|name| among.moving.iter().all(|moving| *moving != *name));
+    // velocities and positions are not loads of a contact
+    let moving = among.stages.iter().flat_map(|s| s.velocity.iter().chain(&s.position));
+    let loads = others().filter(|name| !moving.clone().any(|moving| moving == *name));
     let loads = loads.filter_map(|name| Some((among.columns.of(name)?, name.as_str())));
     loads.filter(|(x, _)| moves(x)).map(|load| with(Some(rubs), Some(load))).collect()
 }
 
 /// Why a kind is not looked for on a channel, in a sentence; `None` without a reason to report.
 fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<String> {
-    let stage = among.stages[site.stage];
+    let stage = &among.stages[site.stage].name;
     let own = || sites.iter().filter(|other| other.stage == site.stage);
     let rubs = among.velocities[site.stage].as_ref();
     let moves = |s: &Site| {
@@ -285,7 +281,7 @@ fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<S
 fn side(site: &Site, among: &Among<'_>) -> String {
     match site.side {
         Side::Output => "output".to_owned(),
-        Side::Input if among.inputs[site.stage] == 1 => "input".to_owned(),
+        Side::Input if among.stages[site.stage].inputs.len() == 1 => "input".to_owned(),
         Side::Input => site.column.clone(),
     }
 }
@@ -294,7 +290,7 @@ fn named(site: &Site, among: &Among<'_>, label: &str) -> String {
     let place = side(site, among);
     match among.stages.len() {
         1 => format!("{place}.{label}"),
-        _ => format!("{}.{place}.{label}", among.stages[site.stage]),
+        _ => format!("{}.{place}.{label}", among.stages[site.stage].name),
     }
 }
 
@@ -325,7 +321,7 @@ fn aliases(
     for k in &kinds {
         for place in [word, &site.column] {
             out.push(format!("{place}.{k}"));
-            out.push(format!("{}.{place}.{k}", among.stages[site.stage]));
+            out.push(format!("{}.{place}.{k}", among.stages[site.stage].name));
         }
     }
     if is_usual {

@@ -235,7 +235,7 @@ impl CalibrationRecord {
 
     /// A receptor that runs the calibration live.
     fn receptor(&self) -> PyResult<Receptor> {
-        LiveReceptor::new(self.calibration()).map(Receptor::new).map_err(said)
+        LiveReceptor::new(self.calibration()).map(|live| Receptor { live }).map_err(said)
     }
 
     /// Estimates of a whole recording, as the receptor gives them live: NaN where a sample has no estimate.

@@ -32,13 +32,7 @@ impl Reading {
 #[pyclass(module = "stretch_gap")]
 #[derive(Debug)]
 pub(crate) struct Receptor {
-    live: LiveReceptor,
-}
-
-impl Receptor {
-    pub(crate) fn new(live: LiveReceptor) -> Self {
-        Self { live }
-    }
+    pub(crate) live: LiveReceptor,
 }
 
 #[pymethods]

@@ -122,12 +122,13 @@ pub(crate) fn shown(subject: &Subject<'_>, stage: usize) -> Option<Shown> {
     let segment = worst_segment(subject, stage)?;
     let dt_s = subject.simulator.dt_s();
     let range = segment.from..segment.to;
-    let begin = begin_of(subject, segment.trial);
+    let trials = subject.simulator.trials();
+    let begin: usize = trials[..segment.trial].iter().map(|t| t.samples).sum();
     let time: Vec<f64> = range.clone().map(|i| (i - begin) as f64 * dt_s).collect();
     let residual = &subject.evidence.stages[stage].residual_retuned[range.clone()];
     let look = worst_window(residual, dt_s)?;
     let (start, end) = (time[look.start], time[look.end - 1]);
-    let name = subject.simulator.trials()[segment.trial].name.clone();
+    let name = trials[segment.trial].name.clone();
     (end > start).then_some(Shown { name, samples: range, time_s: time, window: start..end })
 }
 
@@ -149,10 +150,6 @@ fn worst_segment<'a>(subject: &'a Subject<'_>, stage: usize) -> Option<&'a stret
     };
     let tests = subject.evidence.roles.of_role(Role::Test).filter(|s| s.to - s.from > 20);
     tests.max_by(|a, b| gap(a).total_cmp(&gap(b)))
-}
-
-fn begin_of(subject: &Subject<'_>, trial: usize) -> usize {
-    subject.simulator.trials()[..trial].iter().map(|t| t.samples).sum()
 }
 
 const TIME: &str = "time in the trial, s";

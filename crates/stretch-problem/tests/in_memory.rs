@@ -273,15 +273,3 @@ fn a_sample_time_that_cannot_be_is_refused() {
         });
     }
 }
-
-#[test]
-fn a_trial_that_is_not_there_has_no_length() {
-    let mut session = stretch_sim::Session::new(&Rig::default(), &RunSettings::default()).unwrap();
-    let (_, trial) = session.run(&TrialPlan::pulses(1, 1)).unwrap();
-    let session = RigSession::new(&[SessionTrial::new(trial)]).unwrap();
-    let catalogue = Catalogue::default();
-    let rig = RigSimulator::new(RigSetup { session, rig: Rig::default(), catalogue: &catalogue })
-        .unwrap();
-    assert!(rig.smooth_length(0).is_some());
-    assert_eq!(rig.smooth_length(99), None);
-}

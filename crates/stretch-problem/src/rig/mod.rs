@@ -161,11 +161,6 @@ impl RigSimulator {
     pub fn nominal(&self) -> &RigParams {
         &self.base
     }
-
-    /// The measured length (mm) of a trial, smoothed as the stages see it; none for a trial that does not exist.
-    pub fn smooth_length(&self, trial: usize) -> Option<&[f64]> {
-        self.inputs.length.get(trial).map(|length| length.values.as_slice())
-    }
 }
 
 /// Indices of the stages whose output an effect of `stage` changes.

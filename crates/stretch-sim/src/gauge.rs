@@ -58,15 +58,17 @@ impl Gauge {
             }
     }
 
-    /// Size of the catalogue's unit of a parameter, in units of e or of the span of y.
+    /// Size of the catalogue's unit of a parameter, in units of e or of the span of y; 1 for a unit that does not
+    /// measure the stroke.
+    ///
+    /// ```
+    /// use stretch_sim::{Gauge, effect_named};
+    /// let w = &effect_named("sleeve_slip").unwrap().parameters[0];
+    /// assert_eq!((&*w.unit, Gauge::unit(w)), ("strain", 5.0));
+    /// ```
     pub fn unit(parameter: &EffectParameter) -> f64 {
-        1.0 / Self::stroke(parameter)
-    }
-
-    /// The whole stroke in the unit of a parameter; 1 for a unit that does not measure the stroke.
-    fn stroke(parameter: &EffectParameter) -> f64 {
         let mut strokes = Surroundings::STROKES.iter();
-        strokes.find(|(unit, _)| *unit == parameter.unit).map_or(1.0, |s| s.1)
+        strokes.find(|(unit, _)| *unit == parameter.unit).map_or(1.0, |(_, stroke)| 1.0 / stroke)
     }
 
     /// Returns the ranges and the starts of the search for an effect in a gauge alone.
@@ -75,18 +77,6 @@ impl Gauge {
         let mut search = Search::of(effect, &Extent::between(0.0, 1.0)).times(&units);
         (effect.alone)(alone, &mut search);
         search
-    }
-
-    /// Plausible range and typical value of a parameter in units of e and of y's span.
-    ///
-    /// ```
-    /// use stretch_sim::{Gauge, effect_named};
-    /// let w = &effect_named("sleeve_slip").unwrap().parameters[0];
-    /// assert_eq!(Gauge::range(w), (0.0, 0.15, 0.04));
-    /// ```
-    pub fn range(parameter: &EffectParameter) -> (f64, f64, f64) {
-        let stroke = Self::stroke(parameter);
-        (parameter.min / stroke, parameter.max / stroke, parameter.typical / stroke)
     }
 
     /// Prepares a gauge for recordings sampled every `dt_s`.

@@ -253,7 +253,8 @@ fn a_gauge_alone_is_a_rig() {
         max_relative = 1e1 * F64_ROUNDING
     );
     for effect in CATALOGUE.iter().filter(|e| Gauge::accepts(e, false)) {
-        let values: Vec<f64> = effect.parameters.iter().map(|p| Gauge::range(p).2).collect();
+        let values: Vec<f64> =
+            effect.parameters.iter().map(|p| p.typical * Gauge::unit(p)).collect();
         let mut set = EffectSet::new();
         set.push(effect, &values).unwrap();
         let moved = run(&set).iter().zip(&plain).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);

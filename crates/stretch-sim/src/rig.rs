@@ -176,14 +176,6 @@ impl Rig {
         Bridge::new(&self.params).strain(self.params[Key::L0] * (1.0 - k))
     }
 
-    /// Hard bounds of a parameter when it is re-tuned: three standard deviations about its value, with a lower bound of
-    /// at least a hundredth of the value.
-    pub fn bounds(&self, key: Key) -> (f64, f64) {
-        let value = self.params[key];
-        let sd = self.tolerances[key as usize].sd(value);
-        ((value - 3.0 * sd).max(0.01 * value), value + 3.0 * sd)
-    }
-
     /// Draws a variant of this rig as it might be built. Every parameter is drawn from a Gaussian with its tolerance as
     /// standard deviation, cut at 2.5 standard deviations and at 0.2 of the value. The rig is redrawn until the sleeve
     /// stays stretched and every parameter is valid; `None` after 1000 draws.

@@ -179,7 +179,7 @@ fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -
             all.filter(|t| *t <= end * 1.001).collect()
         }
     };
-    for t in ticks {
+    for (index, t) in ticks.into_iter().enumerate() {
         let x = place(t);
         let line = vec![(x, px(2.0)), (x, bottom)];
         area.draw(&PathElement::new(line, stroke(Ink::Grid.color(), 1.0)))?;
@@ -187,7 +187,7 @@ fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -
             Scale::Percent => tick(100.0 * t, 100.0),
             Scale::NoiseMultiples => number(t, 1),
         };
-        let h = if t == ticks_start(scale) { HPos::Left } else { HPos::Center };
+        let h = if index == 0 { HPos::Left } else { HPos::Center };
         area.draw(&Text::new(text, (x, bottom + px(4.0)), words(Ink::Text, h, VPos::Top)))?;
     }
     let mut y = px(2.0);
@@ -227,13 +227,6 @@ fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -
         Scale::NoiseMultiples => format!("{x_label} (logarithmic)"),
     };
     area.draw(&Text::new(label, corner, words(Ink::Text, HPos::Right, VPos::Bottom)))
-}
-
-fn ticks_start(scale: Scale) -> f64 {
-    match scale {
-        Scale::Percent => 0.0,
-        Scale::NoiseMultiples => 1.0,
-    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 //! it brings, and the next step.
 
 use stretch_data::listed;
-use stretch_gap::{Answer, Diagnosis, Gross, VerdictKind};
+use stretch_gap::{Answer, Diagnosis, Gross, ParameterShift, VerdictKind};
 use stretch_problem::effect_in_words;
 
 use super::{
@@ -175,7 +175,8 @@ fn cheaper(d: &Diagnosis) -> String {
 /// Parameters that re-tuning moved by more than a tolerance, as assignments.
 fn moved(d: &Diagnosis) -> Vec<String> {
     let far = d.parameters.iter().filter(|p| p.is_evidence && p.sigmas.abs() > 1.0);
-    far.map(|p| format!("{} to {}", p.name, unit_number(p.fitted, &p.unit))).collect()
+    let fitted = |p: &ParameterShift| with_unit(&number(p.fitted, 3), shown_unit(&p.unit));
+    far.map(|p| format!("{} to {}", p.name, fitted(p))).collect()
 }
 
 /// Returns a sentence for every named effect. The numbers of an effect are in the section with its code.
@@ -186,8 +187,4 @@ pub(crate) fn causes(subject: &Subject<'_>) -> Vec<String> {
         own.map(|own| format!("{name}: {}.", own.words))
     };
     d.named.iter().filter_map(one).collect()
-}
-
-fn unit_number(x: f64, unit: &str) -> String {
-    with_unit(&number(x, 3), shown_unit(unit))
 }

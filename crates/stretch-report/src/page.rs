@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{canvas::Ink, figure::Figure, live::embedded, markup::escape, script};
+use super::{figure::Figure, live::embedded, markup::escape, script};
 
 /// In tables with at least this many columns, each row becomes a card on a phone.
 const CARDS: usize = 4;
@@ -129,7 +129,8 @@ impl Page {
         if !figure.legend.is_empty() {
             self.put("<div class=\"legend\">");
             for (ink, name) in &figure.legend {
-                self.put(&legend_entry(*ink, name));
+                let (class, name) = (ink.class(), escape(name));
+                self.put(&format!("<span><i class=\"{class}\"></i>{name}</span>\n"));
             }
             self.put("</div>\n");
         }
@@ -221,9 +222,4 @@ impl Page {
         let _ = self.body.write_str(html);
         self
     }
-}
-
-/// Returns the HTML of a colour swatch and its name.
-fn legend_entry(ink: Ink, name: &str) -> String {
-    format!("<span><i class=\"{}\"></i>{}</span>\n", ink.class(), escape(name))
 }

@@ -69,7 +69,8 @@ impl Checked {
         let apart = spec.by.clone().filter(|by| !names.contains(by));
         let mut columns = Columns::read(&trials, names.into_iter().chain(apart.clone()).collect())?;
         columns.choose_turns(stages);
-        let by = apart.and_then(|_| columns.take_last());
+        // the column that distinguishes runs was read last
+        let by = apart.and_then(|_| columns.names.pop().zip(columns.values.pop()));
         check_stated(stages, inputs, &columns)?;
         let sensor = spec.reference.as_ref().zip(spec.signal.as_ref());
         let sensor = sensor.map(|sensor| sensor_of(sensor, stages)).transpose()?;

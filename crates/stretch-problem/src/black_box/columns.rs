@@ -106,11 +106,6 @@ impl Columns {
         }
     }
 
-    /// Removes the last column and returns its name and values.
-    pub(crate) fn take_last(&mut self) -> Option<(String, Vec<f64>)> {
-        self.names.pop().zip(self.values.pop())
-    }
-
     /// Trials that come from recordings with an index of at least `first`.
     pub(crate) fn sources_from(&self, first: usize) -> Vec<usize> {
         (0..self.sources.len()).filter(|trial| self.sources[*trial] >= first).collect()

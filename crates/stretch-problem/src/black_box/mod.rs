@@ -187,11 +187,6 @@ impl BlackBox {
         self.lines.read().unwrap_or_else(PoisonError::into_inner)[stage].clone()
     }
 
-    fn set_line(&self, stage: usize, line: Linear) {
-        let mut lines = self.lines.write().unwrap_or_else(PoisonError::into_inner);
-        lines[stage] = Some(Arc::new(line));
-    }
-
     fn trials_of(&self) -> Trials<'_> {
         Trials { grid: &self.problem.grid, parts: &self.problem.parts }
     }
@@ -292,7 +287,8 @@ impl Simulator for BlackBox {
         match outputs {
             Ok(outputs) => {
                 self.undeclared.look(&self.problem, &self.runs, (&inner, &moves), &outputs);
-                self.set_line(stage, Linear::of(inner, &moves, &outputs));
+                let mut lines = self.lines.write().unwrap_or_else(PoisonError::into_inner);
+                lines[stage] = Some(Arc::new(Linear::of(inner, &moves, &outputs)));
             }
             // Without a linearisation every run is exact.
             Err(SourceError::Refused(_) | SourceError::NotFinite { .. }) => {}

@@ -3,8 +3,8 @@
 use stretch_data::{Channel, Trial};
 use stretch_gap::{GapError, Laboratory, Model, Plan};
 use stretch_sim::{
-    Chain, DEFAULT_STEP_S, EffectSet, Grid, Key, Openings, Recorded, Reference, RigParams,
-    RigStage, Sensing, Start, TrialPlan,
+    Chain, DEFAULT_STEP_S, Grid, Key, Openings, Recorded, Reference, RigStage, Sensing, Start,
+    TrialPlan,
 };
 
 use super::{RigSimulator, nominal::TunedRig};
@@ -244,19 +244,14 @@ impl Experiment {
 }
 
 impl RigSimulator {
-    /// The rig and the effects that a model describes.
-    fn rig_of(&self, model: &Model) -> Result<(RigParams, EffectSet), ProblemError> {
-        let params = TunedRig::of(&self.base, &self.tuned, model).params;
-        Ok((params, unrecorded(&self.effects, &self.rows, model)?))
-    }
-
     /// Every recorded channel of an experiment, in units of its noise.
     fn prediction(
         &self,
         model: &Model,
         experiment: &Experiment,
     ) -> Result<Vec<Vec<f64>>, ProblemError> {
-        let (mut params, effects) = self.rig_of(model)?;
+        let mut params = TunedRig::of(&self.base, &self.tuned, model).params;
+        let effects = unrecorded(&self.effects, &self.rows, model)?;
         params[Key::VExc] *= experiment.excitation;
         let samples = experiment.inlet.len();
         let mut out = [(); 3].map(|()| vec![0.0; samples]);

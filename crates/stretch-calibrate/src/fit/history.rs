@@ -58,8 +58,8 @@ const fn design(relaxations_s: &'static [f64], radii: &'static [f64], degree: u8
 /// The states of every sample in one vector. A separate vector for each sample would take three times the memory.
 #[derive(Debug, Clone)]
 pub struct States {
-    width: usize,
-    values: Vec<f64>,
+    pub(super) width: usize,
+    pub(super) values: Vec<f64>,
 }
 
 impl States {

@@ -326,7 +326,7 @@ fn bounds(pieces: &[Piece], forward: &Forward, period_s: f64) -> (Vec<f64>, f64)
             values.clear();
             values.extend(sample.features.iter().map(|f| slope * f));
             values.extend((0..taus.len()).map(|i| {
-                let moved = nudged[i].row(SETTLE + n)[1 + i] - sample.features[1 + i];
+                let moved = nudged[i].at(SETTLE + n)[1 + i] - sample.features[1 + i];
                 slope * dynamics[1 + i] * moved / (NUDGE * taus[i])
             }));
             rows.push(at, &values, residual);

@@ -13,7 +13,10 @@ use crate::{
     prepare::{Prepared, Tally, noise},
 };
 
-use super::{curve::Place, history::SETTLE};
+use super::{
+    curve::Place,
+    history::{SETTLE, States},
+};
 
 const RADII: [f64; 3] = [0.03, 0.1, 0.3];
 /// Least slope of the drive with respect to the target while plays (hysteresis elements) stand still, as a share of the
@@ -53,22 +56,6 @@ pub(crate) struct Piece {
     /// Pressures; empty if no pressure is needed.
     pub(crate) pressure: Vec<f64>,
     rate: Vec<f64>,
-}
-
-/// Derivatives of the drive with respect to each dynamic parameter, with a row for each sample of a piece.
-pub(crate) struct Features {
-    values: Vec<f64>,
-    width: usize,
-}
-
-impl Features {
-    fn rows(&self) -> impl Iterator<Item = &[f64]> + Clone {
-        self.values.chunks_exact(self.width)
-    }
-
-    pub(crate) fn row(&self, sample: usize) -> &[f64] {
-        &self.values[sample * self.width..][..self.width]
-    }
 }
 
 /// A sample: the signal, and the inputs of the model.
@@ -121,7 +108,8 @@ pub(crate) fn pieces(
 }
 
 impl Piece {
-    pub(crate) fn features(&self, choice: ObserverChoice, period_s: f64) -> Features {
+    /// Returns the derivatives of the drive with respect to each dynamic parameter, for each sample.
+    pub(crate) fn features(&self, choice: ObserverChoice, period_s: f64) -> States {
         let first = self.smooth[0];
         let mut slow: Vec<(f64, f64)> =
             choice.taus().map(|tau| (first, lag_share(period_s, tau))).collect();
@@ -139,15 +127,15 @@ impl Piece {
                 values.push(y - *p);
             }
         }
-        Features { values, width }
+        States { values, width }
     }
 
     /// Iterates over the samples after the low-passes have settled, with their `features`.
     pub(crate) fn samples<'a>(
         &'a self,
-        features: &'a Features,
+        features: &'a States,
     ) -> impl Iterator<Item = Sample<'a>> + Clone {
-        let all = self.smooth.iter().zip(features.rows()).zip(&self.signal).skip(SETTLE);
+        let all = self.smooth.iter().zip(features.iter()).zip(&self.signal).skip(SETTLE);
         all.map(|((&target, features), &signal)| Sample { target, features, signal })
     }
 }

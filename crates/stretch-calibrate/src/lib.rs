@@ -35,6 +35,6 @@ pub mod toolkit {
             LinearFactor, RowAccumulator, SETTLE, Solution, StateDesign, States, TermRows,
             leave_one_out,
         },
-        prepare::{even, even_signals, extent, noise, pooled_range, sample_rate_hz},
+        prepare::{even, even_signals, extent, noise, pooled_range, provenance, sample_rate_hz},
     };
 }

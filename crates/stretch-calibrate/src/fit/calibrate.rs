@@ -1,9 +1,12 @@
 //! Fits a calibration to logged trials.
 
-use stretch_core::{Calibration, Provenance};
+use stretch_core::Calibration;
 use stretch_data::Trial;
 
-use crate::{CalibrateError, Memory, ModelKind, Options, prepare::Prepared};
+use crate::{
+    CalibrateError, Memory, ModelKind, Options,
+    prepare::{Prepared, provenance},
+};
 
 use super::{
     diagnosed::{DiagnosedChoice, diagnosed},
@@ -82,11 +85,7 @@ pub(crate) fn calibrate_with(
         }
     };
     notes.splice(0..0, prepared.notes.iter().cloned());
-    let names = trials.iter().map(|t| t.name.as_str());
-    let columns = [options.signal.as_str(), options.reference.as_str()];
-    let checksums: Vec<Option<u32>> = trials.iter().map(|t| t.checksum(&columns)).collect();
-    let provenance =
-        Provenance::new(&options.date, names).with_checksums(checksums.into_iter().flatten());
+    let provenance = provenance(&options.date, trials, [&options.signal, &options.reference]);
     let calibration = prepared.calibration(model, provenance)?;
     Ok((Calibrated { calibration, fits, notes }, made))
 }

@@ -332,6 +332,17 @@ fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError>
     })
 }
 
+/// Returns the origin of a calibration: its date, and its trials with the checksums of their columns.
+pub fn provenance<'a>(
+    date: &str,
+    trials: &[Trial],
+    columns: impl IntoIterator<Item = &'a String>,
+) -> Provenance {
+    let columns: Vec<&str> = columns.into_iter().map(String::as_str).collect();
+    Provenance::new(date, trials.iter().map(|trial| trial.name.as_str()))
+        .with_checksums(trials.iter().filter_map(|trial| trial.checksum(&columns)))
+}
+
 /// Returns the range of a column from its least and greatest value.
 ///
 /// # Errors

@@ -5,7 +5,7 @@ use stretch_calibrate::{
     CalibrateError, MOST_ROWS,
     toolkit::{SETTLE, States, even, extent, sample_rate_hz},
 };
-use stretch_core::{Provenance, SampleRate};
+use stretch_core::SampleRate;
 use stretch_data::{Trial, check_rows};
 use stretch_metrics::Agreement;
 
@@ -180,17 +180,6 @@ fn without_an_open_end(
         values.len() - last
     );
     Ok((cut, Some(note)))
-}
-
-/// Returns the origin of a calibration: its date, and its trials with the checksums of their columns.
-pub(crate) fn provenance<'a>(
-    date: &str,
-    trials: &[Trial],
-    columns: impl IntoIterator<Item = &'a String>,
-) -> Provenance {
-    let columns: Vec<&str> = columns.into_iter().map(String::as_str).collect();
-    Provenance::new(date, trials.iter().map(|trial| trial.name.as_str()))
-        .with_checksums(trials.iter().filter_map(|trial| trial.checksum(&columns)))
 }
 
 /// Returns Pearson's correlation of two equally long sequences; zero if one of them is constant.

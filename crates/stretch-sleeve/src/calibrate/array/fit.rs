@@ -3,17 +3,14 @@
 
 use stretch_calibrate::{
     CalibrateError,
-    toolkit::{extent, pooled_range},
+    toolkit::{extent, pooled_range, provenance},
 };
 use stretch_core::{Interval, Normalisation, Target};
 use stretch_data::Trial;
 
 use crate::{
     SleeveCalibration, SleeveError,
-    calibrate::{
-        channels::{Channels, provenance},
-        linear::Linear,
-    },
+    calibrate::{channels::Channels, linear::Linear},
 };
 
 use super::{

@@ -9,14 +9,17 @@ use std::collections::HashMap;
 
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
-use stretch_calibrate::{CalibrateError, toolkit::extent};
+use stretch_calibrate::{
+    CalibrateError,
+    toolkit::{extent, provenance},
+};
 use stretch_data::{Trial, unit_of};
 
 use crate::{
     SleeveCalibration, SleeveError,
     calibrate::{
         bank::Bank,
-        channels::{Channels, provenance},
+        channels::Channels,
         linear::{Linear, inverse, symmetric},
     },
 };

@@ -4,7 +4,7 @@ use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use stretch_calibrate::{
     CalibrateError,
-    toolkit::{RowAccumulator, extent},
+    toolkit::{RowAccumulator, extent, provenance},
 };
 use stretch_data::{Trial, unit_of};
 
@@ -13,7 +13,7 @@ use crate::{
     calibrate::{
         array::Still,
         bank::Bank,
-        channels::{Channels, correlation, provenance},
+        channels::{Channels, correlation},
         linear::{Linear, cholesky, term_correlation},
     },
 };

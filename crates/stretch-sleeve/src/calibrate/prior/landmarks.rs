@@ -4,6 +4,7 @@
 //! it, is smallest and largest. The rest is the 10 % in which the signals move least.
 
 use serde::{Deserialize, Serialize};
+use stretch_calibrate::toolkit::extent;
 use stretch_core::Interval;
 
 use crate::calibrate::channels::Channels;
@@ -64,9 +65,7 @@ fn span(domain: Interval) -> f64 {
 
 /// Counts how often a level passes from its lower third to its upper third or back.
 pub(crate) fn passes(levels: impl Iterator<Item = f64> + Clone) -> usize {
-    let (low, high) = levels
-        .clone()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let Interval { min: low, max: high } = extent(levels.clone());
     let third = (high - low) / 3.0;
     let (mut passes, mut was_high) = (0, None);
     for level in levels {

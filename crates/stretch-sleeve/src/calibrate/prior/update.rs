@@ -73,6 +73,11 @@ pub struct UpdateSummary {
     pub half_width_95: f64,
 }
 
+/// Returns the error of data that do not fit the prior.
+fn refused(problem: String) -> Result<(), SleeveError> {
+    Err(SleeveError::Prior { file: "the prior".into(), problem })
+}
+
 impl Prior {
     /// Makes a calibration from the prior and a reference of ten seconds to a minute, by Bayesian least squares.
     /// Without trials, the calibration comes from the prior alone.
@@ -216,10 +221,8 @@ impl Prior {
         signals: &[String],
         reference: &str,
     ) -> Result<(), SleeveError> {
-        let problem =
-            |problem: String| Err(SleeveError::Prior { file: "the prior".into(), problem });
         if signals.len() != self.signals.len() {
-            return problem(format!(
+            return refused(format!(
                 "it has {} channels ({}), and {} were named: name as many with --signal, in that order, or learn a prior from these",
                 self.signals.len(),
                 self.signals.join(","),
@@ -227,7 +230,7 @@ impl Prior {
             ));
         }
         if let Some(name) = elsewhere(signals, &self.signals) {
-            return problem(format!(
+            return refused(format!(
                 "{name} does not have the same position in the signals of the prior ({}) as in {}, and signals are matched by position: name them in \
                  the order of the prior",
                 self.signals.join(","),
@@ -235,7 +238,7 @@ impl Prior {
             ));
         }
         if unit_of(reference) != unit_of(&self.reference) {
-            return problem(format!(
+            return refused(format!(
                 "its reference is {} and that of these data is {reference}: convert the data (stretch convert), so that both are in one unit",
                 self.reference
             ));
@@ -251,10 +254,8 @@ impl Prior {
                 .reference()
                 .map(|x| self.target_range.normalise(self.target.from_reference(x))),
         );
-        let problem =
-            |problem: String| Err(SleeveError::Prior { file: "the prior".into(), problem });
         if range.min > 3.0 || range.max < -2.0 || range.max - range.min > 10.0 {
-            return problem(format!(
+            return refused(format!(
                 "the reference of these data lies far outside its range in the sessions: is {} in another unit?",
                 self.reference
             ));
@@ -266,7 +267,7 @@ impl Prior {
             (follows, share * (domain.max - domain.min) / (own.max - own.min))
         });
         if is_other_unit(steeper) {
-            return problem(format!(
+            return refused(format!(
                 "for the same change of the signals, the reference of these data changes by a different amount than in the sessions of the prior: is {} in \
                  another unit, such as radians instead of degrees? Convert it (stretch convert)",
                 self.reference
@@ -277,11 +278,9 @@ impl Prior {
 
     /// Refuses signals of another rate or unit.
     pub(crate) fn refuse_signals(&self, channels: &Channels) -> Result<(), SleeveError> {
-        let problem =
-            |problem: String| Err(SleeveError::Prior { file: "the prior".into(), problem });
         let hz = channels.sample_rate.hz();
         if (hz / self.sample_rate_hz - 1.0).abs() > 0.05 {
-            return problem(format!(
+            return refused(format!(
                 "it has {:.4} samples a second and the data {hz:.4}: resample the data (stretch convert --grid {})",
                 self.sample_rate_hz, self.sample_rate_hz
             ));
@@ -294,14 +293,14 @@ impl Prior {
                 .signal(k)
                 .fold((0usize, 0usize), |(n, far_off), x| (n + 1, far_off + usize::from(far(x))));
             if 2 * outside > all {
-                return problem(format!(
+                return refused(format!(
                     "{name} ran from {:.4} to {:.4} in its sessions, and most of these samples lie far outside: is the signal in another \
                      unit, reversed, or from another gauge?",
                     domain.min, domain.max
                 ));
             }
         }
-        self.misplaced(channels).map_or(Ok(()), problem)
+        self.misplaced(channels).map_or(Ok(()), refused)
     }
 
     /// Refuses data in which most channels that clearly follow the reference do so in the opposite direction.
@@ -313,13 +312,10 @@ impl Prior {
             (correlation(channels.signal(k), channels.reference()), prior)
         };
         if let Some(opposite) = turned((0..self.signals.len()).map(pair)) {
-            return Err(SleeveError::Prior {
-                file: "the prior".into(),
-                problem: format!(
-                    "{opposite} of {} channels fall where they rose in its sessions: swap the wires of the bridge, or change the sign of the signal",
-                    self.signals.len()
-                ),
-            });
+            return refused(format!(
+                "{opposite} of {} channels fall where they rose in its sessions: swap the wires of the bridge, or change the sign of the signal",
+                self.signals.len()
+            ));
         }
         Ok(())
     }

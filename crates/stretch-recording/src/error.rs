@@ -315,14 +315,6 @@ impl RecordingError {
         DataError::from(FileError::io(path, action, cause)).into()
     }
 
-    pub(crate) fn missing_column<'a>(
-        file: &str,
-        column: &str,
-        present: impl Iterator<Item = &'a str>,
-    ) -> Self {
-        DataError::missing_column(file, column, present).into()
-    }
-
     /// Returns the error for column names without a time.
     pub(crate) fn missing_time(file: &str, column: &str, names: &[String]) -> Self {
         let present = names.iter().map(String::as_str);

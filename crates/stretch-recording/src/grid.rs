@@ -233,7 +233,7 @@ fn find(file: &str, tracks: &mut [Track], wanted: &str) -> Result<(), RecordingE
         |name: &str| name.strip_suffix(wanted).is_some_and(|path| path.ends_with(['/', '.']));
     let found: Vec<String> = all().filter(|n| ends_so(n)).map(str::to_owned).collect();
     let [name] = &found[..] else {
-        return Err(RecordingError::missing_column(file, wanted, all()));
+        return Err(DataError::missing_column(file, wanted, all()).into());
     };
     for channel in tracks.iter_mut().flat_map(|t| &mut t.channels) {
         if channel.name == *name {

@@ -1,6 +1,6 @@
 //! The names of a table's columns.
 
-use stretch_data::{Place, shown};
+use stretch_data::{DataError, Place, shown};
 
 use crate::{
     ReadOptions, RecordingError,
@@ -89,7 +89,7 @@ impl Header {
     /// Returns the index of column `name`.
     pub(crate) fn position(&self, file: &str, name: &str) -> Result<usize, RecordingError> {
         self.names.iter().position(|n| n == name).ok_or_else(|| {
-            RecordingError::missing_column(file, name, self.names.iter().map(String::as_str))
+            DataError::missing_column(file, name, self.names.iter().map(String::as_str)).into()
         })
     }
 

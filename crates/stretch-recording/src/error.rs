@@ -361,11 +361,6 @@ impl RecordingError {
         Self::Convert { file: file.to_owned(), format, command, extra }
     }
 
-    /// Whether time stayed the same or went back.
-    pub fn is_time(&self) -> bool {
-        matches!(self, Self::Data(DataError::TimeNotRising { .. }))
-    }
-
     /// Whether one row is at fault, so that a stream may go on with the next.
     pub fn is_row(&self) -> bool {
         matches!(

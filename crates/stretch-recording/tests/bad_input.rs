@@ -2,7 +2,7 @@
 
 use std::io::{self, Read};
 
-use stretch_data::Trial;
+use stretch_data::{DataError, Trial};
 use stretch_recording::{ReadOptions, Recording, RecordingError, RowReader};
 
 fn read(text: impl AsRef<[u8]>) -> Result<Trial, RecordingError> {
@@ -241,7 +241,9 @@ fn a_stream_survives_its_rows() {
             Ok(row) => format!("{} {} {}", row.row, row.time_s, row.values[0]),
             Err(error) => {
                 assert!(error.is_row());
-                format!("{} {}", if error.is_time() { "time:" } else { "row:" }, error)
+                let is_time =
+                    matches!(error, RecordingError::Data(DataError::TimeNotRising { .. }));
+                format!("{} {}", if is_time { "time:" } else { "row:" }, error)
                     .chars()
                     .take(22)
                     .collect()

@@ -4,7 +4,7 @@
 use std::{fs, path::PathBuf, sync::OnceLock};
 
 use libfuzzer_sys::fuzz_target;
-use stretch_data::DataSet;
+use stretch_data::{DataSet, RigFile};
 use stretch_recording::{ReadOptions, Recording};
 
 /// Between two files.
@@ -30,7 +30,7 @@ fuzz_target!(|bytes: &[u8]| {
         fs::write(folder.join(name), parts.next().unwrap_or_default()).expect("a file");
     }
     let Ok(set) = DataSet::read(folder) else { return };
-    let _ = set.read_rig(folder);
+    let _ = set.rig.as_ref().map(|rig| RigFile::read(folder.join(rig)));
     if let Ok(trials) = Recording::session(&set, folder, &ReadOptions::new()) {
         assert!(trials.iter().all(|trial| trial.trial.check_lengths().is_ok()));
     }

@@ -156,14 +156,6 @@ impl DataSet {
         })
     }
 
-    /// Reads the rig file of the data set, if one is named.
-    ///
-    /// # Errors
-    /// As [`RigFile::read`].
-    pub fn read_rig(&self, folder: impl AsRef<Path>) -> Result<Option<RigFile>, DataError> {
-        self.rig.as_ref().map(|rig| RigFile::read(folder.as_ref().join(rig))).transpose()
-    }
-
     /// Stores the digest of each trial's file in a folder. From then on, loading a trial fails if
     /// its file was replaced, for example by a file of another data set.
     ///

@@ -180,11 +180,6 @@ impl Session {
         (0..self.signals.len()).map(|k| one(1 + k * own)).collect()
     }
 
-    /// Returns the duration of all parts in seconds.
-    pub fn seconds(&self) -> f64 {
-        self.parts.iter().map(|part| part.rows as f64).sum::<f64>() / self.sample_rate_hz
-    }
-
     /// Returns the number of rows and the factor of each part with the terms over `bank`. The reference is multiplied
     /// by `scale`, and `shift` is added.
     pub(crate) fn factors(

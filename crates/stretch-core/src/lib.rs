@@ -56,6 +56,6 @@ pub use rest::RestTracker;
 pub use rest_level::{Baseline, RestLevel};
 pub use stage::{Design, Runner, Stage};
 pub use surface::{Poly13, Surface};
-pub use unit::{Hertz, Millimetres, MillimetresPerSecond, SampleRate, Seconds, Strain, Volts};
+pub use unit::{Hertz, Millimetres, MillimetresPerSecond, SampleRate, Seconds, Volts};
 pub use values::Values;
 pub use visible::is_hidden;

@@ -137,11 +137,6 @@ impl<T: Real> Range<T> {
     pub fn max(&self) -> T {
         self.spec.max
     }
-
-    /// Returns the normalisation formula.
-    pub fn mode(&self) -> Normalisation {
-        self.spec.mode
-    }
 }
 
 impl<T: Real> TryFrom<RangeSpec<T>> for Range<T> {

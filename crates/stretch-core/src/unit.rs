@@ -2,7 +2,7 @@
 //!
 //! They have no arithmetic. Internal code uses the bare number (field `0`).
 
-use crate::{DesignError, Real};
+use crate::DesignError;
 
 macro_rules! unit {
     ($($(#[$doc:meta])* $name:ident, $symbol:literal;)*) => {$(
@@ -31,8 +31,6 @@ unit! {
     Seconds, "s";
     /// A frequency of a signal (a cutoff, say), in hertz. Not a [`SampleRate`].
     Hertz, "Hz";
-    /// A relative change of length; here a contraction, (L0 - L)/L0.
-    Strain, "(strain)";
 }
 
 /// Sample rate of a stream, in samples per second: finite and above zero.
@@ -81,12 +79,5 @@ impl TryFrom<f64> for SampleRate {
 impl From<SampleRate> for f64 {
     fn from(rate: SampleRate) -> f64 {
         rate.0
-    }
-}
-
-impl<T: Real> Millimetres<T> {
-    /// Returns the length in metres.
-    pub fn metres(self) -> T {
-        self.0 / T::from_f64(1000.0)
     }
 }

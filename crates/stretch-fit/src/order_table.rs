@@ -71,7 +71,6 @@ pub type OrderEntry<T> = (Degree, Result<OrderRow<T>, FitError>);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OrderTable<T> {
-    chosen: Degree,
     rows: [Option<OrderEntry<T>>; MOST],
 }
 
@@ -167,7 +166,7 @@ impl<T: Real> OrderTable<T> {
         for ((place, degree), judged) in rows.iter_mut().zip(orders).zip(judged) {
             *place = degree.map(|degree| (degree, row(&all, degree, judged.finish(degree))));
         }
-        let mut table = Self { chosen, rows };
+        let mut table = Self { rows };
         let best = table.best().map(|row| row.degree);
         if let Some(best) = orders.iter().position(|&degree| degree == best) {
             for ((_, row), differences) in table.rows.iter_mut().flatten().zip(differences) {
@@ -179,11 +178,6 @@ impl<T: Real> OrderTable<T> {
             }
         }
         Ok(table)
-    }
-
-    /// Returns the chosen order, to which the others are compared.
-    pub fn chosen(&self) -> Degree {
-        self.chosen
     }
 
     /// Returns each order with its row, or with the error of its fit, by rising number of terms.

@@ -56,11 +56,6 @@ impl<T: Real> BlockMeans<T> {
         self.filled = 0;
         self.sum = Sum::new();
     }
-
-    /// Returns the number of samples in the incomplete block.
-    pub fn pending(&self) -> u64 {
-        self.filled
-    }
 }
 
 /// A [`PairedT`] test on the means over blocks of samples.

@@ -283,11 +283,6 @@ impl<T: Real> Defects<T> {
         }
     }
 
-    /// Whether a pressure is needed.
-    pub fn needs_pressure(&self) -> bool {
-        self.crosstalk.is_some()
-    }
-
     /// Returns the memory of a gauge whose target has rested at `y`.
     pub fn begin(&self, y: T, pressure: T) -> DefectsMemory<T> {
         let zero = T::zero();

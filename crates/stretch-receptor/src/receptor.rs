@@ -137,11 +137,6 @@ impl<T: Real, R> StretchReceptor<T, R> {
     pub fn at(&self, branch: Branch, rate: T, signal: T) -> Reading<T> {
         self.model.reading(branch, rate, signal)
     }
-
-    /// The rate estimator.
-    pub fn rate_design(&self) -> &R {
-        &self.model.rate
-    }
 }
 
 impl<T: Real, R> Surfaces<T, R> {

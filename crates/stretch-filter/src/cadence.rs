@@ -59,13 +59,6 @@ pub enum Arrival {
     NotFinite,
 }
 
-impl Arrival {
-    /// Returns whether an estimator may continue, because no sample is missing.
-    pub fn is_continuous(self) -> bool {
-        matches!(self, Self::First | Self::OnTime | Self::Jitter { .. })
-    }
-}
-
 impl Cadence {
     /// Creates a cadence. An interval is on time if it deviates from one period by at most
     /// `tolerance` periods, from 0 to 0.5.

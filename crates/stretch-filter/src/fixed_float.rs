@@ -35,7 +35,6 @@ pub struct IntegerSgRate<const WINDOW: usize, const DEGREE: usize, const DELAY: 
     fraction_bits: i32,
     /// Factor from the output of `sums` to the sample's unit per second.
     per_second: f32,
-    sample_rate: SampleRate,
 }
 
 impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
@@ -56,17 +55,7 @@ impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
         let fraction_bits = 31 - exponent;
         let per_sample = FixedSgRate::<i32, WINDOW, DEGREE, DELAY>::PER_SAMPLE;
         let per_second = libm::ldexp(per_sample * sample_rate.hz(), -fraction_bits);
-        Ok(Self {
-            sums: FixedSgRate::new(),
-            fraction_bits,
-            per_second: per_second as f32,
-            sample_rate,
-        })
-    }
-
-    /// Returns the sample rate of the design.
-    pub fn sample_rate(&self) -> SampleRate {
-        self.sample_rate
+        Ok(Self { sums: FixedSgRate::new(), fraction_bits, per_second: per_second as f32 })
     }
 
     /// Returns `x 2^fraction_bits`, rounded and saturated, without a floating-point operation.

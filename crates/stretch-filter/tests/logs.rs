@@ -113,7 +113,6 @@ proptest! {
         } else {
             prop_assert_eq!(arrival, Arrival::Gap { missing });
         }
-        prop_assert_eq!(arrival.is_continuous(), missing == 0);
     }
 }
 

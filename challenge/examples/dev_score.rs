@@ -3,7 +3,7 @@
 
 use std::{fs, path::Path, time::Instant};
 
-use stretch_blind::{CaseKind, Score, Seal, Truth, Verdict};
+use stretch_blind::{CaseKind, Score, Truth, Verdict};
 use stretch_challenge::{ANSWER, diagnosed};
 use stretch_gap::Options;
 
@@ -14,8 +14,8 @@ fn main() -> anyhow::Result<()> {
         std::process::exit(2);
     };
     let folder = Path::new(folder);
-    let truth: Truth = match Seal::open(folder) {
-        Ok((_, truth)) => truth,
+    let truth: Truth = match Truth::open(folder) {
+        Ok((truth, _)) => truth,
         Err(_) => serde_json::from_str(&fs::read_to_string(folder.join("truth.json"))?)?,
     };
     let mut verdicts = Vec::new();

@@ -13,7 +13,7 @@
 use std::path::Path;
 
 use rayon::prelude::*;
-use stretch_blind::{Label, Seal};
+use stretch_blind::{Label, Truth};
 use stretch_calibrate::{Cause, Memory, ModelKind, Options, calibrate, evaluate};
 use stretch_core::{Calibration, Design, DiagnosedMap, Model, RestLevel};
 use stretch_data::{DataSet, SessionTrial, Split, Trial};
@@ -43,7 +43,7 @@ fn main() -> Result<(), Failure> {
     };
     let count = arguments.next().map_or(Ok(CASES), |n| n.parse())?;
     let folder = Path::new(&folder);
-    let (_, truth) = Seal::open(folder)?;
+    let (truth, _) = Truth::open(folder)?;
     let taken: Vec<(&String, &Label)> =
         truth.cases.iter().filter(|(_, label)| is_sensing(label)).take(count).collect();
     let rows: Result<Vec<Row>, Failure> =

@@ -8,7 +8,7 @@
 use std::{fs, path::Path};
 
 use rayon::prelude::*;
-use stretch_blind::{Family, Label, Score, Seal, Verdict};
+use stretch_blind::{Family, Label, Score, Truth, Verdict};
 use stretch_challenge::{ANSWER, Case, calibrated, diagnosed};
 use stretch_gap::{Diagnosis, Options};
 
@@ -18,7 +18,7 @@ fn main() -> anyhow::Result<()> {
         std::process::exit(2);
     };
     let folder = Path::new(&folder);
-    let (_, truth) = Seal::open(folder)?;
+    let (truth, _) = Truth::open(folder)?;
     let mut cases: Vec<Case> = Vec::new();
     for (name, label) in &truth.cases {
         let text = fs::read_to_string(folder.join(name).join(ANSWER))?;

@@ -8,7 +8,7 @@
 
 use std::{fs, path::Path};
 
-use stretch_blind::Seal;
+use stretch_blind::Truth;
 use stretch_challenge::{ANSWER, Case, calibrated};
 use stretch_gap::Diagnosis;
 
@@ -25,7 +25,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut cases: Vec<Case> = Vec::new();
     let mut seeds = Vec::new();
     for folder in &folders {
-        let (_, truth) = Seal::open(Path::new(folder))?;
+        let (truth, _) = Truth::open(Path::new(folder))?;
         seeds.extend(truth.seed.map(|seed| seed.to_string()));
         for (name, label) in truth.cases {
             let file = Path::new(folder).join(&name).join(ANSWER);

@@ -189,9 +189,9 @@ fn made(make: &Make) -> anyhow::Result<()> {
     }
     let Make { family, disturbances, protocol, .. } = *make;
     let plan = Plan { family, disturbances, protocol, ..Plan::of(make.cases) };
-    let seal = make_cases(&make.out, make.seed, &plan)?;
+    let sha256 = make_cases(&make.out, make.seed, &plan)?;
     let (cases, out) = (make.cases, make.out.display());
-    say(format!("made {cases} cases in {out}; labels sealed, SHA-256 {}", seal.sha256()));
+    say(format!("made {cases} cases in {out}; labels sealed, SHA-256 {sha256}"));
     Ok(())
 }
 

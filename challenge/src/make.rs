@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use anyhow::{Context, ensure};
 use serde::{Deserialize, Serialize};
-use stretch_blind::{FormFamily, OpenScore, Plan, PlantName, Seal, make, make_set, sealed_beside};
+use stretch_blind::{FormFamily, OpenScore, Plan, PlantName, Truth, make, make_set, sealed_beside};
 use stretch_data::files::{write_folder, write_whole};
 
 use crate::text::Progress;
@@ -14,7 +14,7 @@ use crate::text::Progress;
 ///
 /// # Errors
 /// A folder that is not empty, a plan without a case, a file that cannot be written.
-pub fn make_cases(folder: &Path, seed: u64, plan: &Plan) -> anyhow::Result<Seal> {
+pub fn make_cases(folder: &Path, seed: u64, plan: &Plan) -> anyhow::Result<String> {
     let cases = plan.cases();
     ensure!(cases > 0, "--cases 0: there is nothing to make");
     let progress = Progress::new("making cases", cases);
@@ -22,7 +22,7 @@ pub fn make_cases(folder: &Path, seed: u64, plan: &Plan) -> anyhow::Result<Seal>
         make(draft, seed, plan, &|_| progress.step())?;
         anyhow::Ok(())
     })?;
-    Ok(Seal::open(folder)?.0)
+    Ok(Truth::open(folder)?.1)
 }
 
 /// Makes a set of cases of a plant, completely or not at all; refuses a spent seed.

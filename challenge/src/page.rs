@@ -23,7 +23,7 @@ const STRENGTHS: [f64; 8] = [0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 /// the goals.
 pub(crate) fn page(score: &Score, answers: &Answers, reached: &[Goal]) -> String {
     let mut page = Page::new("Blind check of the diagnosis", &sentence(score));
-    goals(&mut page, answers.seal.sha256(), reached);
+    goals(&mut page, &answers.sha256, reached);
     methods(&mut page, score);
     strength(&mut page, score, answers);
     sets(&mut page, score, answers);

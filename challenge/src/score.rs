@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, ensure};
-use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Score, Seal, Truth, Verdict};
+use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Score, Truth, Verdict};
 use stretch_data::files::Outputs;
 use stretch_gap::Options;
 
@@ -24,8 +24,8 @@ pub const ANSWER: &str = "diagnosis.json";
 /// What is scored.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Answers {
-    /// The seal of the labels, unbroken.
-    pub seal: Seal,
+    /// SHA-256 of the labels, as sealed.
+    pub sha256: String,
     /// The labels.
     pub truth: Truth,
     /// What was answered; a case that was refused has none.
@@ -38,7 +38,7 @@ impl Answers {
     /// # Errors
     /// A broken seal, a folder without a case, an invalid answer.
     pub(crate) fn read(folder: &Path) -> anyhow::Result<Self> {
-        let (seal, truth) = Seal::open(folder)?;
+        let (truth, sha256) = Truth::open(folder)?;
         let mut verdicts = Vec::new();
         for (name, path) in case_folders(folder)? {
             let file = path.join(ANSWER);
@@ -48,7 +48,7 @@ impl Answers {
                 verdicts.push(Verdict::from_diagnosis(&name, &raw)?);
             }
         }
-        Ok(Self { seal, truth, verdicts })
+        Ok(Self { sha256, truth, verdicts })
     }
 }
 
@@ -94,7 +94,7 @@ pub fn score_answers(folder: &Path, with_oracle: bool) -> anyhow::Result<String>
         outputs.file(folder.join(file), |out| out.write_all(text.as_bytes()))?;
     }
     outputs.keep()?;
-    Ok(text(&score, &goals, answers.seal.sha256()))
+    Ok(text(&score, &goals, &answers.sha256))
 }
 
 fn text(score: &Score, goals: &[Goal], sha256: &str) -> String {

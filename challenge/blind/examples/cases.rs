@@ -16,7 +16,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         Some("plain") => plan = plan.plain(),
         Some(name) => plan.family = Some(name.parse()?),
     }
-    let seal = make(Path::new(folder), seed.parse()?, &plan, &|done| eprint!("\r{done} done"))?;
-    println!("\nsealed: {}", seal.sha256());
+    let sha256 = make(Path::new(folder), seed.parse()?, &plan, &|done| eprint!("\r{done} done"))?;
+    println!("\nsealed: {sha256}");
     Ok(())
 }

@@ -2,13 +2,13 @@
 //! `challenge/` describes the cases.
 //!
 //! ```
-//! use stretch_blind::{Plan, Score, Seal, Verdict, make};
+//! use stretch_blind::{Plan, Score, Truth, Verdict, make};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let dir = tempfile::tempdir()?;
 //! let plan = Plan { single: 1, ..Plan::of(0) };
-//! let seal = make(dir.path(), 7, &plan, &|done| eprintln!("{done} made"))?;
-//! println!("{}", seal.sha256()); // before anything is diagnosed
+//! let sha256 = make(dir.path(), 7, &plan, &|done| eprintln!("{done} made"))?;
+//! println!("{sha256}"); // before anything is diagnosed
 //!
 //! // A diagnosis that never sees `sealed/` reads case-000 and answers:
 //! let answer = serde_json::json!({
@@ -16,7 +16,7 @@
 //! });
 //! let verdict = Verdict::from_diagnosis("case-000", &answer)?;
 //!
-//! let (_, truth) = Seal::open(dir.path())?; // an error if a label was altered
+//! let (truth, _) = Truth::open(dir.path())?; // an error if a label was altered
 //! let score = Score::of(&truth, &[verdict])?;
 //! assert_eq!(score.misses.len(), usize::from(truth.cases["case-000"].excess >= 0.1));
 //! println!("{score}");
@@ -65,7 +65,6 @@ pub use rate::{Bin, Calibration, Rate};
 pub use score::{
     Baseline, COUNTED_EXCESS, FamilyRow, Miss, STAND_IN, Score, Several, Singles, Struck,
 };
-pub use seal::Seal;
 pub use submission::{Answer, Believed, Figures, Interval, OpenScore, Outcome, Said, Submission};
 pub use table::method_in_words;
 pub use truth::{Acting, CaseKind, Label, TWINS, Truth, are_twins};

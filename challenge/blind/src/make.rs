@@ -13,7 +13,7 @@ use crate::case::{Case, Recording};
 use crate::error::BlindError;
 use crate::plan::Plan;
 use crate::protocol::{RATE_HZ, Split};
-use crate::seal::{MARK, Seal};
+use crate::seal::MARK;
 use crate::truth::Truth;
 
 /// Makes the cases of a plan under `dir` and seals their labels.
@@ -24,7 +24,7 @@ use crate::truth::Truth;
 /// catalogue. The same seed and plan give the same bytes, whatever the number of threads.
 /// `progress` is called with the number of finished cases, possibly from several threads.
 ///
-/// The hash in the [`Seal`] is to be shown before any diagnosis runs.
+/// The returned SHA-256 is to be shown before any diagnosis runs.
 ///
 /// # Errors
 /// [`BlindError::Occupied`] when `dir` holds a seal already; [`BlindError::Io`] when a file
@@ -33,8 +33,8 @@ use crate::truth::Truth;
 /// ```
 /// let dir = tempfile::tempdir()?;
 /// let plan = stretch_blind::Plan { null: 1, ..stretch_blind::Plan::of(0) };
-/// let seal = stretch_blind::make(dir.path(), 7, &plan, &|_| {})?;
-/// assert_eq!(seal.sha256().len(), 64);
+/// let sha256 = stretch_blind::make(dir.path(), 7, &plan, &|_| {})?;
+/// assert_eq!(sha256.len(), 64);
 /// assert!(dir.path().join("case-000/pulses_2.csv").exists());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -43,7 +43,7 @@ pub fn make(
     seed: u64,
     plan: &Plan,
     progress: &(dyn Fn(usize) + Sync),
-) -> Result<Seal, BlindError> {
+) -> Result<String, BlindError> {
     if dir.join(MARK).exists() || dir.join("sealed").exists() {
         return Err(BlindError::Occupied { path: dir.to_path_buf() });
     }
@@ -61,7 +61,7 @@ pub fn make(
         })
         .collect();
     let truth = Truth { schema: 1, seed: Some(seed), cases: labels?.into_iter().collect() };
-    Seal::close(dir, &truth)
+    truth.seal(dir)
 }
 
 /// Writes a text, with the folders above it.

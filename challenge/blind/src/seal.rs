@@ -12,36 +12,23 @@ pub(crate) const MARK: &str = "seal.sha256";
 /// Where the labels of a check lie in its folder.
 const LABELS: &str = "sealed/truth.json";
 
-/// The sealed labels of a set of cases: `sealed/truth.json` next to the case folders, and its
-/// SHA-256 in `seal.sha256`.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Seal {
-    sha256: String,
-}
-
-impl Seal {
-    /// Writes the labels and their hash under `dir`.
+impl Truth {
+    /// Writes the labels to `sealed/truth.json` under `dir`, next to the case folders, and their
+    /// SHA-256 to `seal.sha256`; returns the SHA-256, 64 hexadecimal digits.
     ///
     /// # Errors
     /// [`BlindError::Io`] when a file cannot be written.
-    pub fn close(dir: &Path, truth: &Truth) -> Result<Self, BlindError> {
-        Ok(Self { sha256: close(dir, &dir.join(LABELS), LABELS, truth)? })
+    pub fn seal(&self, dir: &Path) -> Result<String, BlindError> {
+        close(dir, &dir.join(LABELS), LABELS, self)
     }
 
-    /// SHA-256 of the labels, 64 hexadecimal digits.
-    #[must_use]
-    pub fn sha256(&self) -> &str {
-        &self.sha256
-    }
-
-    /// Opens the labels under `dir`, if their hash has not changed.
+    /// Opens the labels under `dir`, if their hash has not changed; also returns the hash.
     ///
     /// # Errors
     /// [`BlindError::SealBroken`] if it has; [`BlindError::Io`], [`BlindError::Json`] if a file is
     /// missing or invalid.
-    pub fn open(dir: &Path) -> Result<(Self, Truth), BlindError> {
-        let (truth, sha256) = open(&dir.join(LABELS), dir)?;
-        Ok((Self { sha256 }, truth))
+    pub fn open(dir: &Path) -> Result<(Self, String), BlindError> {
+        open(&dir.join(LABELS), dir)
     }
 }
 
@@ -95,10 +82,9 @@ mod tests {
     fn an_altered_label_breaks_the_seal() {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let truth = Truth { schema: 1, seed: Some(4), cases: Default::default() };
-        let seal = Seal::close(dir.path(), &truth).expect("closed");
-        let (opened, read) = Seal::open(dir.path()).expect("unaltered");
-        assert_eq!((opened, read), (seal.clone(), truth));
+        let sealed = truth.seal(dir.path()).expect("closed");
+        assert_eq!(Truth::open(dir.path()).expect("unaltered"), (truth, sealed));
         fs::write(dir.path().join(LABELS), "{ \"schema\": 1, \"cases\": {} }\n").expect("altered");
-        assert!(matches!(Seal::open(dir.path()), Err(BlindError::SealBroken { .. })));
+        assert!(matches!(Truth::open(dir.path()), Err(BlindError::SealBroken { .. })));
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use stretch_blind::{BlindError, CaseKind, Disturbances, Family, Plan, Protocol, Seal, make};
+use stretch_blind::{BlindError, CaseKind, Disturbances, Family, Plan, Protocol, Truth, make};
 
 fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
@@ -40,8 +40,8 @@ fn same_seed_same_bits_whatever_the_number_of_threads() {
     assert_eq!(first, files(dirs[1].path()));
 
     // Labels are only in the sealed folder; a folder that has one is not overwritten.
-    let (seal, truth) = Seal::open(dirs[0].path()).expect("an unbroken seal");
-    assert_eq!((seal.sha256().len(), truth.cases.len()), (64, 4));
+    let (truth, sha256) = Truth::open(dirs[0].path()).expect("an unbroken seal");
+    assert_eq!((sha256.len(), truth.cases.len()), (64, 4));
     let again = make(dirs[0].path(), 42, &small(), &|_| {});
     assert!(matches!(again, Err(BlindError::Occupied { .. })));
     for (name, label) in &truth.cases {
@@ -79,7 +79,7 @@ fn a_case_says_its_family_its_disturbances_and_a_lower_excitation() {
     let made = [Disturbances::Drawn, Disturbances::Plain].map(|disturbances| {
         let dir = tempfile::tempdir().expect("a temporary folder");
         make(dir.path(), 9, &Plan { disturbances, ..plan }, &|_| {}).expect("a case");
-        let (_, truth) = Seal::open(dir.path()).expect("an unbroken seal");
+        let (truth, _) = Truth::open(dir.path()).expect("an unbroken seal");
         let label = truth.cases["case-000"].clone();
         assert_eq!((label.family, label.acting[0].form.as_str()), (Family::Spectra, "spectra"));
         let found = files(&dir.path().join("case-000"));

@@ -26,8 +26,8 @@ use crate::{
     make::{make, write},
     plan::Plan,
     protocol::Protocol,
-    seal::{self, Seal},
-    truth::CaseKind,
+    seal,
+    truth::{CaseKind, Truth},
 };
 
 worded! {
@@ -192,7 +192,7 @@ fn make_rig(set: &Path, cases: usize, seed: u64) -> Result<OpenTruth, BlindError
         ..Plan::of(0)
     };
     make(set, seed, &plan, &|_| ())?;
-    let (_, labels) = Seal::open(set)?;
+    let (labels, _) = Truth::open(set)?;
     // move these labels to the neighbouring folder
     let inside = set.join("sealed");
     fs::remove_dir_all(&inside).map_err(BlindError::io(&inside))?;

@@ -175,7 +175,8 @@ impl Samples {
         let status = Status {
             compared: twin.answers().then_some((0, 0.0)),
             adc_bits: adc.spec().bits,
-            ..Status::of(&twin.unit)
+            unit: twin.unit.clone(),
+            ..Status::default()
         };
         // The default is for a calibration file that does not contain a sample period.
         let time_line = TimeLine::new(twin.period_s.unwrap_or(TICK_S));

@@ -169,11 +169,6 @@ pub(crate) struct Status {
 }
 
 impl Status {
-    /// Returns the state before the first byte.
-    pub(super) fn of(unit: &str) -> Self {
-        Self { unit: unit.to_owned(), ..Self::default() }
-    }
-
     /// Returns the status line for a terminal.
     pub(super) fn live_line(&self) -> String {
         let newest = self.newest.map_or_else(

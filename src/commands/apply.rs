@@ -206,7 +206,8 @@ fn live(
     Ok(())
 }
 
-fn write_all(
+/// Writes the estimates of a trial as CSV.
+pub(super) fn write_all(
     calibration: &Calibration,
     trial: &Trial,
     applied: &Applied,
@@ -224,7 +225,7 @@ fn write_all(
 
 /// Returns the header `time_s,estimate_mm,rate_mm_per_s,branch,domain`, with the unit of the
 /// reference. The column `sd_mm` is added if the model computes a standard deviation.
-pub(super) fn header(calibration: &Calibration) -> String {
+fn header(calibration: &Calibration) -> String {
     let unit = unit(calibration.spec().reference.as_str())
         .map_or(String::new(), |unit| format!("_{unit}"));
     let sd = if knows_sd(calibration) { format!(",sd{unit}") } else { String::new() };
@@ -260,17 +261,6 @@ fn push_line(
         }
     };
     line.push(b'\n');
-}
-
-/// Returns the estimates of a trial as the bytes of a CSV file.
-pub(super) fn estimates_csv(
-    calibration: &Calibration,
-    trial: &Trial,
-    applied: &Applied,
-) -> io::Result<Vec<u8>> {
-    let mut text = Vec::new();
-    write_all(calibration, trial, applied, &mut text)?;
-    Ok(text)
 }
 
 /// Reports a shift of the gauge's zero once, and again only after the zero has returned.

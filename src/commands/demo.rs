@@ -12,14 +12,14 @@ use stretch_calibrate::{
     Calibrated, Candidate, Evaluation, MODELS_IN_WORDS, MethodErrors, ModelChoice, ModelKind,
     Options, apply, calibrate, choose_model, evaluate, rank_signals, write_calibration,
 };
-use stretch_data::files::write_folder;
+use stretch_data::files::{write_folder, write_whole};
 use stretch_data::{Trial, TrialKind, listed};
 use stretch_problem::{Examined, Problem, in_words};
 use stretch_report::{Context, Judged, Subject, calibration_verdict, demo_page, readme_picture};
 use stretch_sim::{ActiveEffect, RunSettings, TrialPlan, demo_preset, effect_named};
 
 use super::{
-    apply::estimates_csv,
+    apply::write_all,
     calibration_text::{print as print_calibration, print_models},
     diagnose::{print as print_diagnosis, told_on},
     evaluate::print_errors,
@@ -161,8 +161,8 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
     }
     if let Some((_, trial)) = sessions.test.first() {
         let chosen = &calibrations.chosen.calibration;
-        let estimates = estimates_csv(chosen, trial, &apply(chosen, trial)?)?;
-        stretch_data::files::write_whole(file("estimates.csv"), |out| out.write_all(&estimates))?;
+        let applied = apply(chosen, trial)?;
+        write_whole(file("estimates.csv"), |out| write_all(chosen, trial, &applied, out))?;
     }
     let names =
         |trials: &[(TrialKind, Trial)]| trials.iter().map(|(_, t)| t.name.clone()).collect();

@@ -21,9 +21,8 @@ pub(crate) struct Compared {
     /// Design effect: number of correlated rows that carry as much information as one independent
     /// row.
     pub design_effect: f64,
-    /// F statistic. `freedom` holds its two degrees of freedom.
+    /// F statistic.
     pub f: f64,
-    pub freedom: [f64; 2],
     /// Probability of at least this change if the sensor has not moved.
     pub p: f64,
 }
@@ -83,7 +82,6 @@ pub(crate) fn compare(first: &[Day], second: &[Day]) -> Result<Compared, String>
         change: change(&branches, &apart),
         design_effect: sum / size as f64,
         f,
-        freedom,
         p: reference.sf(f),
     })
 }

@@ -102,9 +102,8 @@ pub(crate) fn write_records(
     let records = texts(records)?;
     let reasons = column(answer, "refused").map(texts).transpose()?;
     let keys = ["site", "rig", "sensor", "date"];
-    let keys: Vec<_> = keys.iter().filter_map(|key| Some((*key, column(answer, key)?))).collect();
-    let keys: Vec<_> =
-        keys.into_iter().map(|(key, own)| Ok((key, texts(own)?))).collect::<anyhow::Result<_>>()?;
+    let named = |key| Some(texts(column(answer, key)?).map(|own| (key, own)));
+    let keys: Vec<_> = keys.into_iter().filter_map(named).collect::<anyhow::Result<_>>()?;
     ensure!(
         !keys.is_empty() || records.len() == 1,
         "the {} calibrations have no names: select site, rig or sensor in addition to the fit",

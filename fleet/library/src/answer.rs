@@ -9,8 +9,8 @@ use datafusion::arrow::{
 use stretch_calibrate::calibration_to_json;
 use stretch_core::{
     BranchSurface, Calibration, CalibrationSpec, Degree, FitSummary, Interval, Label, LinearMap,
-    Model, Normalisation, Polarity, Provenance, Range, RangeSpec, RateEstimator, RateSource,
-    SampleRate, Schema, Surface, Target,
+    Model, Normalisation, Polarity, Provenance, Range, RangeSpec, RateSource, SampleRate, Schema,
+    Surface, Target,
 };
 use stretch_fit::{Factor, Fit, FitError};
 
@@ -199,10 +199,8 @@ struct Whole<'a, const TERMS: usize> {
     span: Span,
 }
 
-/// All parts of a calibration except the numbers of its model.
+/// The ranges over which signal and target are normalised.
 struct Frame {
-    sample_rate_hz: SampleRate,
-    rate_estimator: RateEstimator,
     signal: Range,
     target: Range,
 }
@@ -222,9 +220,8 @@ impl<const TERMS: usize> Whole<'_, TERMS> {
         let (Some(hz), Some(rate_estimator)) = (about.sample_rate_hz, about.rate_estimator) else {
             return Ok(None);
         };
+        let sample_rate_hz = SampleRate::new(hz).map_err(|e| e.to_string())?;
         let frame = Frame {
-            sample_rate_hz: SampleRate::new(hz).map_err(|e| e.to_string())?,
-            rate_estimator,
             signal: range(Normalisation::MinMax, self.span, SIGNAL)?,
             target: range(Normalisation::MinMax, self.span, REFERENCE)?,
         };
@@ -233,12 +230,12 @@ impl<const TERMS: usize> Whole<'_, TERMS> {
             schema: Schema::CURRENT,
             signal: Label::new(&about.signal).map_err(|e| e.to_string())?,
             reference: Label::new(&about.reference).map_err(|e| e.to_string())?,
-            sample_rate_hz: frame.sample_rate_hz,
+            sample_rate_hz,
             target: Target::Direct,
             polarity: self.polarity,
             signal_range: frame.signal,
             target_range: frame.target,
-            rate_estimator: frame.rate_estimator,
+            rate_estimator,
             rate_source: RateSource::Voltage,
             dead_band: 0.0,
             model,

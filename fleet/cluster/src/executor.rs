@@ -85,7 +85,6 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
     // Removed when the executor stops, but not when it is killed.
     let temporary = tempfile::Builder::new().prefix("stretch-executor-").tempdir()?;
     let work_dir = options.work_dir.unwrap_or_else(|| temporary.path().to_owned());
-    let defaults = ExecutorProcessConfig::default();
     let config = ExecutorProcessConfig {
         grpc_port: chosen(listens_on, 0)?,
         bind_host: before_port(listens_on),
@@ -101,7 +100,7 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
         override_function_registry: Some(Arc::new(functions)),
         override_logical_codec: Some(Marked::<BallistaLogicalExtensionCodec>::new(&release)),
         override_physical_codec: Some(Marked::<BallistaPhysicalExtensionCodec>::new(&release)),
-        ..defaults
+        ..ExecutorProcessConfig::default()
     };
     say(format_args!("{} {} for df://{host}:{scheduler_port}", release.who, release.version));
     start_executor_process(Arc::new(config)).await.map_err(|e| anyhow!("{}: {e}", release.who))

@@ -17,10 +17,6 @@ pub const RANGE_ROUND_TRIP: f64 = 8.0 * f64::EPSILON;
 /// In codes: a single rounding to nearest of an exact sum.
 pub const LAST_ROUNDING: f64 = 0.5;
 
-/// In units of the input, up to 1: a hysteresis of slopes from 0.1 to 9 and its inverse. At each of
-/// four plays there are about 20 roundings of values up to 9, magnified by up to 10.
-pub const HYSTERESIS_INVERSE: f64 = 1e-11;
-
 /// Relative to the reference's full scale: the receptor combines the normalisation with the
 /// coefficients. Therefore it computes in another order than the formula in the paper, which makes
 /// a difference of a few hundred roundings of terms up to `3 * 4^5` (21 terms of the polynomial

@@ -27,7 +27,7 @@ use crate::{
 /// A row whose time goes back is also an error, but the clock continues from there, so that only one row is lost when a
 /// logger restarts. A time that does not advance is an error only if neither the step of the clock nor an expected rate
 /// is known; otherwise such samples are spread over the step. A caller that keeps a state from row to row should reset
-/// it if [`RecordingError::is_time`] returns true.
+/// it after an error of the time column.
 ///
 /// ```
 /// use stretch_recording::{ReadOptions, RowReader};

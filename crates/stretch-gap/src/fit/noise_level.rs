@@ -9,8 +9,6 @@
 //! runs on its *measured* input x (teacher forcing) and passes the noise of x on to its output.
 //! Without this part, the noise of the input would look like a gap where the output is steep.
 
-use std::ops::Range;
-
 use rayon::prelude::*;
 
 use crate::{
@@ -21,6 +19,7 @@ use crate::{
         runs::Runs,
         sample_roles::SampleRoles,
         simulator::{Model, Run, Simulator},
+        spec::TrialSpec,
     },
 };
 
@@ -87,12 +86,7 @@ fn noise_level(
     if mean > 1e-4 * own {
         source += ", and the measured input's noise";
     }
-    let mut end = 0;
-    let trials = simulator.trials().iter().map(|trial| {
-        end += trial.samples;
-        end - trial.samples..end
-    });
-    let trials: Vec<Range<usize>> = trials.collect();
+    let trials = TrialSpec::ranges(simulator.trials());
     let mut sd = Vec::with_capacity(samples);
     for trial in &trials {
         let part = &arrived[trial.clone()];

@@ -20,6 +20,7 @@ use crate::problem::{
     record_facts::Recorded,
     sample_roles::{Role, SampleRoles},
     simulator::Simulator,
+    spec::TrialSpec,
 };
 
 /// A recorded signal, scaled.
@@ -79,12 +80,7 @@ impl TermInputs {
     ) -> Result<Self, GapError> {
         let spec = &simulator.stages()[stage];
         let (trials, dt_s) = (simulator.trials(), simulator.dt_s());
-        let mut ranges = Vec::new();
-        let mut begin = 0;
-        for trial in trials {
-            ranges.push(begin..begin + trial.samples);
-            begin += trial.samples;
-        }
+        let ranges = TrialSpec::ranges(trials);
         let grid = Grid::samples(dt_s).map_err(|e| GapError::simulator(e.to_string()))?;
         let first_s = trials.first().map_or(0.0, |t| t.start_s);
         let fitted = || roles.of_role(Role::Fit);
@@ -102,7 +98,7 @@ impl TermInputs {
             grid,
         };
         let mut all = recorded(simulator);
-        all.retain(|s| s.name != spec.channel && s.values.len() >= begin);
+        all.retain(|s| s.name != spec.channel && s.values.len() >= own.len());
         all.push(Recorded::measured(&spec.channel, &spec.unit, own));
         for signal in all {
             let Some(signal) = Signal::of(signal, roles, dt_s) else { continue };

@@ -69,12 +69,8 @@ fn looked_at(
     simulator: &dyn Simulator,
 ) -> impl Iterator<Item = impl Iterator<Item = &[f64]> + Clone> {
     let trials = simulator.trials();
-    let mut end = 0;
-    let part = |(trial, looked): (&TrialSpec, usize)| {
-        end += trial.samples;
-        end - trial.samples..end - trial.samples + looked
-    };
-    let parts: Vec<_> = trials.iter().zip(SampleRoles::not_tested(trials)).map(part).collect();
+    let parts = TrialSpec::ranges(trials).into_iter().zip(SampleRoles::not_tested(trials));
+    let parts: Vec<_> = parts.map(|(all, looked)| all.start..all.start + looked).collect();
     (0..simulator.stages().len()).map(move |stage| {
         let measured = simulator.measured(stage);
         parts.clone().into_iter().map(move |part| &measured[part])

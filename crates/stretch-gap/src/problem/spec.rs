@@ -3,6 +3,8 @@
 //!
 //! Entries are plain data; [`Description::new`](crate::Description::new) checks them together.
 
+use std::ops::Range;
+
 use serde::Serialize;
 use stretch_effects::EffectParameter;
 
@@ -211,5 +213,21 @@ impl TrialSpec {
     /// Creates a trial that begins at `start_s` of the session; `is_test` marks a test trial.
     pub fn new(name: &str, samples: usize, start_s: f64, is_test: bool) -> Self {
         Self { name: name.into(), samples, start_s, is_test }
+    }
+
+    /// Returns the range of samples of each trial. The samples of all trials are stored end to end.
+    ///
+    /// ```
+    /// use stretch_gap::TrialSpec;
+    /// let trials = [TrialSpec::new("a", 400, 0.0, false), TrialSpec::new("b", 100, 10.0, true)];
+    /// assert_eq!(TrialSpec::ranges(&trials), [0..400, 400..500]);
+    /// ```
+    pub fn ranges(trials: &[Self]) -> Vec<Range<usize>> {
+        let mut end = 0;
+        let one = |trial: &Self| {
+            end += trial.samples;
+            end - trial.samples..end
+        };
+        trials.iter().map(one).collect()
     }
 }

@@ -6,8 +6,6 @@ use std::ops::Range;
 use stretch_gap::{Line, Model, SampleRoles, TrialSpec};
 use stretch_sim::{Effect, EffectSet, Find, Measured, SimError};
 
-use super::trials::ranges;
-
 /// The measured samples of a channel outside the test samples, from which effects may be estimated.
 #[derive(Debug, Clone)]
 pub(crate) struct FitRecord {
@@ -19,7 +17,7 @@ pub(crate) struct FitRecord {
 impl FitRecord {
     /// The fit samples of a channel that holds all trials end to end.
     pub(crate) fn of(trials: &[TrialSpec], measured: &[f64], dt_s: f64) -> Self {
-        let parts = ranges(trials).into_iter().zip(SampleRoles::not_tested(trials));
+        let parts = TrialSpec::ranges(trials).into_iter().zip(SampleRoles::not_tested(trials));
         let part =
             |(all, fit): (Range<usize>, usize)| measured[all.start..all.start + fit].to_vec();
         Self { parts: parts.map(part).collect(), dt_s }

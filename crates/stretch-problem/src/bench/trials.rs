@@ -21,19 +21,9 @@ pub(crate) fn column(session: &EvenSession, column: usize) -> Vec<f64> {
     session.trials().iter().filter_map(|t| t.columns().get(column)).flatten().copied().collect()
 }
 
-/// Range of samples of every trial.
-pub(crate) fn ranges(trials: &[TrialSpec]) -> Vec<Range<usize>> {
-    let mut end = 0;
-    let one = |trial: &TrialSpec| {
-        end += trial.samples;
-        end - trial.samples..end
-    };
-    trials.iter().map(one).collect()
-}
-
 /// Ranges of the samples outside the test samples.
 pub(crate) fn looked_at(trials: &[TrialSpec]) -> Vec<Range<usize>> {
-    let parts = ranges(trials).into_iter().zip(SampleRoles::not_tested(trials));
+    let parts = TrialSpec::ranges(trials).into_iter().zip(SampleRoles::not_tested(trials));
     parts.map(|(all, fit)| all.start..all.start + fit).filter(|r| !r.is_empty()).collect()
 }
 

@@ -7,7 +7,7 @@ use stretch_gap::TrialSpec;
 
 use super::spec::StageEntry;
 use crate::{
-    bench::trials::{column, looked_at, ranges, specs},
+    bench::trials::{column, looked_at, specs},
     error::ProblemError,
 };
 
@@ -113,7 +113,7 @@ impl Columns {
 
     /// Range of samples of every trial.
     pub(crate) fn ranges(&self) -> Vec<Range<usize>> {
-        ranges(&self.trials)
+        TrialSpec::ranges(&self.trials)
     }
 
     /// Ranges of the samples outside the test samples.

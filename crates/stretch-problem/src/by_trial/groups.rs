@@ -3,8 +3,6 @@
 use stretch_data::ends;
 use stretch_gap::TrialSpec;
 
-use crate::bench::trials::ranges;
-
 /// Samples that are fitted together, as indices into all trials end to end.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Group {
@@ -27,7 +25,7 @@ const FEWEST: usize = 20;
 
 /// Returns one group for each trial.
 pub(super) fn by_trial(trials: &[TrialSpec]) -> Vec<Group> {
-    let each = ranges(trials).into_iter().zip(trials);
+    let each = TrialSpec::ranges(trials).into_iter().zip(trials);
     each.map(|(samples, trial)| Group { name: trial.name.clone(), samples: samples.collect() })
         .collect()
 }
@@ -76,7 +74,7 @@ fn levels(values: &[f64]) -> Option<Vec<f64>> {
 fn set_ups(values: &[f64], trials: &[TrialSpec]) -> Option<Vec<f64>> {
     let mut medians = Vec::new();
     let mut widest = 0.0_f64;
-    for range in ranges(trials) {
+    for range in TrialSpec::ranges(trials) {
         let mut own = values[range].to_vec();
         own.sort_by(f64::total_cmp);
         let at = |share: f64| own.get((share * own.len() as f64) as usize).copied();

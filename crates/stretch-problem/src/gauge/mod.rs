@@ -11,7 +11,7 @@ use std::ops::Range;
 use stretch_data::SessionTrial;
 use stretch_gap::{
     Description, DescriptionSpec, GapError, Line, Model, Noise, ParameterSpec, Run, Simulator,
-    StageSpec,
+    StageSpec, TrialSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
@@ -24,7 +24,7 @@ use crate::{
     bench::{
         acting::{Acting, FitRecord, lines},
         specs::{Place, shown, spec as spec_of},
-        trials::{ranges, session_s},
+        trials::session_s,
     },
     error::ProblemError,
     rig::smooth::{Draws, Smoothed, unscheduled},
@@ -130,7 +130,8 @@ impl GaugeSimulator {
             let allowed = unscheduled(range.len());
             Smoothed::of(&session.reference[range], reference_noise.sd(), &allowed)
         };
-        let inputs: Vec<Smoothed> = ranges(&session.trials).into_iter().map(smooth).collect();
+        let inputs: Vec<Smoothed> =
+            TrialSpec::ranges(&session.trials).into_iter().map(smooth).collect();
         let alone = alone(&session);
         let has_pressure = nominal.spec.pressure_scale.is_some();
         let is_missing = |e: &&Effect| nominal.effects.find(e.name).is_none();

@@ -48,8 +48,8 @@ fn is_near(found: f64, expected: f64) -> bool {
 /// In one record of ten they take so much that a knee in the middle of the range explains the rest as well.
 #[test]
 fn a_square_is_proposed_as_a_square() {
-    let is_square = |seed: &u64| {
-        let proposed = found(*seed, |x| x.iter().map(|x| 0.3 * x * x).collect());
+    let other = |seed: u64| {
+        let proposed = found(seed, |x| x.iter().map(|x| 0.3 * x * x).collect());
         let [term] = &proposed.terms[..] else { panic!("{}", proposed.equation) };
         assert_eq!(term.form.passage, Passage::Direct, "{}", proposed.equation);
         // A knee as near to the end of the range as shapes are refined is the same.
@@ -58,10 +58,11 @@ fn a_square_is_proposed_as_a_square() {
             [Factor::Above { signal: 0, at, power }] => power == 2.0 && at < 0.002,
             _ => false,
         };
-        is_square && is_near(term.coefficient, 0.3)
+        let is_found = is_square && is_near(term.coefficient, 0.3);
+        (!is_found).then_some(proposed.equation)
     };
-    let squares = (1..=10).filter(is_square).count();
-    assert!(squares >= 9, "{squares} of 10");
+    let others: Vec<String> = (1..=10).filter_map(other).collect();
+    assert!(others.len() <= 1, "{others:?}");
 }
 
 /// A spring that stiffens on either side of where it is slack is one term, not a sine and a memory.

@@ -85,7 +85,7 @@ pub(crate) fn judge(case: &Case<'_>, thresholds: &Thresholds) -> Judged {
         return Judged { kind: Record, seen: Record, overruled: None, seen_naming };
     }
     let seen = seen(case, thresholds);
-    // The set of an effect can lose to an unknown cause only because the recording is short.
+    // An unknown cause may be the most probable only because the recording is short.
     let needs_more = matches!(seen, Effect | Partial | Unknown);
     let too_little = case.too_little.filter(|_| needs_more).map(Overruled::TooLittle);
     let overruled = at_bounds(case).or(too_little);
@@ -297,7 +297,11 @@ mod tests {
         assert_eq!(verdict.overruled, Some(Overruled::TooLittle(short)));
         // A note below the verdict names the effects that were found.
         assert_eq!(verdict.seen_naming.named, ["play"]);
-        // If no effect would be named, a short recording does not override the verdict.
+        // An unknown cause may be the most probable only because the recording is short.
+        let unknown = judged(gap, [0.2, 0.0, 0.8], |case| case.too_little = Some(short));
+        assert_eq!((unknown.kind, unknown.seen), (Unknown, Unknown));
+        assert_eq!(unknown.overruled, Some(Overruled::TooLittle(short)));
+        // If there is no relevant gap, a short recording does not override the verdict.
         let quiet = judged([0.01; 3], [0.0, 1.0, 0.0], |case| case.too_little = Some(short));
         assert_eq!((quiet.kind, quiet.overruled), (NoGap, None));
     }

@@ -103,12 +103,9 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     let task = Task { examines_effects, ..task };
     let between_rows = command_timing::between_rows(simulator);
     let (problem, from) = prepare(task, between_rows.as_ref())?;
-    let is_limited = simulator.model_runs().is_some_and(|runs| runs.budget.is_some());
     let spare = simulator.model_runs().map(|_| Searched::without(problem.clone()));
-    // First make the runs that an answer without effects needs, so that there is an answer even if
-    // the search spends the budget.
-    if let Some(spare) = spare.as_ref().filter(|_| is_limited) {
-        gather(task, spare.cause(&columns), 0.0)?;
+    if let Some(spare) = &spare {
+        make_runs_of_answer(task, spare.cause(&columns))?;
     }
     match (answered(task, problem, &from, &columns, &begun), spare) {
         (Err(error), Some(spare)) if error.is_of_runs() => {
@@ -117,6 +114,15 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
         }
         (answer, _) => answer,
     }
+}
+
+/// If the number of runs is limited, makes the runs that an answer with this cause needs. There is
+/// then an answer even if the rest of the search spends the budget.
+fn make_runs_of_answer(task: Task<'_>, cause: Cause<'_>) -> Result<(), GapError> {
+    if task.simulator.model_runs().is_some_and(|runs| runs.budget.is_some()) {
+        gather(task, cause, 0.0)?;
+    }
+    Ok(())
 }
 
 /// Searches for effects, tests for errors of the recording, and concludes.
@@ -247,9 +253,13 @@ fn search<'a>(
     }
     progress("nuisances");
     let other = re_estimated(&problem, &mut search.sets, &best, options.seed)?;
-    let rivalled = |mut search: Search<'_>, best| {
-        let found = search.rivalled(best, progress)?;
-        let eliminated = eliminated(&mut search.sets, &found.best)?;
+    let rivalled = |mut search: Search<'_>, best: Hypothesis| {
+        let alone = Found { best: best.clone(), rivals: Vec::new() };
+        let cause = Cause { problem: search.problem, found: &alone, eliminated: &[], gross: &[] };
+        make_runs_of_answer(task, cause)?;
+        let found = if_possible(search.rivalled(best, progress))?.unwrap_or(alone);
+        let eliminated =
+            if_possible(eliminated(&mut search.sets, &found.best))?.unwrap_or_default();
         let looked = search.looked_at_nominal();
         Ok::<_, GapError>((found, eliminated, search.sets.tried, looked))
     };

@@ -47,7 +47,7 @@ const LOOKED: usize = 4;
 
 /// The search over sets of effects.
 pub(crate) struct Search<'a> {
-    problem: &'a PreparedProblem<'a>,
+    pub(crate) problem: &'a PreparedProblem<'a>,
     acceptance: Acceptance<'a>,
     pub(crate) sets: Sets<'a>,
     /// Largest number of effects in a set.

@@ -228,13 +228,20 @@ mod tests {
         }
     }
 
+    /// A gain that moved by 5 % is seen in each of 20 pairs of months, and in most of them with p below 1e-3.
     #[test]
     fn a_gain_that_moved_is_seen() {
-        let mut dice = RandomGenerator::new(6, 0);
-        let compared = compare(&month(&mut dice, 20, 1.0), &month(&mut dice, 20, 1.05)).unwrap();
-        assert!(compared.p < 1e-3, "{compared:?}");
-        // 5 % of a value that moves between 0 and about 0.2.
-        assert!((0.002..0.02).contains(&compared.change), "{compared:?}");
+        let mut clear = 0;
+        for seed in 0..20 {
+            let mut dice = RandomGenerator::new(seed, 0);
+            let compared =
+                compare(&month(&mut dice, 20, 1.0), &month(&mut dice, 20, 1.05)).unwrap();
+            assert!(compared.p < 0.05, "seed {seed}: {compared:?}");
+            // 5 % of a value that moves between 0 and about 0.2.
+            assert!((0.002..0.02).contains(&compared.change), "seed {seed}: {compared:?}");
+            clear += usize::from(compared.p < 1e-3);
+        }
+        assert!(clear > 10, "{clear} of 20");
     }
 
     #[test]

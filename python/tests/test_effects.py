@@ -69,6 +69,7 @@ def test_the_code_of_an_effect_is_the_effect(kind, hide, parameter, value):
     exec(found.fix().code, pasted)  # what a user would paste
     fixed = run(pasted, f"output_{kind}", pasted["parameters"]["compliance"] * FORCE)
     assert np.std(fixed - hidden) < 0.4 * np.std(noise(FORCE.size))
+    np.testing.assert_allclose(found.fix()(), found.curves()["with_effects"], rtol=1e-9, atol=1e-9)
 
 
 def test_a_diagnosis_from_text_has_equations_in_place_of_functions():
@@ -96,3 +97,7 @@ def test_friction_is_found_by_the_speed_at_which_it_rubs():
     assert found.named == ["output.coulomb_friction"]
     assert found.effects["output.coulomb_friction"]["f"] == pytest.approx(1.5, rel=0.05)
     assert "def output_coulomb_friction(x, v):" in found.fix().code
+    with pytest.raises(
+        stretch_gap.StretchError, match=r"output\.coulomb_friction cannot be applied .* depends on v .* put its function from"
+    ):
+        found.fix()()

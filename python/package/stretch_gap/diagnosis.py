@@ -302,9 +302,9 @@ class Diagnosis:
         Returns
         -------
         Fix
-            Re-tuned parameters, values of the named effects, and both as Python code. `Fix.predict` predicts new recordings,
-            and `Fix.diagnose` diagnoses the fixed simulator. If the diagnosis was read from text, the code contains equations
-            instead of functions, and the fix cannot be run.
+            Re-tuned parameters, values of the named effects, and both as Python code. The fix is called in place of the
+            simulator. `Fix.predict` predicts new recordings, and `Fix.diagnose` diagnoses the fixed simulator. If the diagnosis
+            was read from text, the code contains equations instead of functions, and the fix cannot be run.
         """
         return fix(self.parameters, self.effects, self._answer.get("implement", []), self._functions, self._again)
 
@@ -592,6 +592,7 @@ def diagnose(
         raise StretchError(f"depth is {depth}, the largest number of effects that may be named; give 1 or more")
     asked = None if simulator is None else Asked(simulator)
     notes: list[str] = []
+    off: list[float] = []
     if isinstance(data, (str, os.PathLike)) and os.fspath(data).endswith(".toml"):
         if output is not None or stages is not None or parameters or effects:
             raise StretchError(f"{os.fspath(data)} defines output, stages, parameters and effects; leave these arguments out")
@@ -612,11 +613,13 @@ def diagnose(
             wrappers, noise_in = _behind(wrappers, driven, notes), {}
         else:
             noise_in = dict(noise)
+        own = [entries.effect(key, value) for key, value in (effects or {}).items()]
+        off = [a["range"][0] if a["off"] is None else a["off"] for effect in own for a in effect["argument"]]
         problem = {
             "stage": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
             "input": [{"column": c, "unit": units.get(c, ""), "noise": float(noise_in.get(c, 0.0))} for c in driven],
             "parameter": [entries.parameter(key, value) for key, value in (parameters or {}).items()],
-            "effect": [entries.effect(key, value) for key, value in (effects or {}).items()],
+            "effect": own,
             "wrap": wrappers,
             "without": list(without),
             "beside": list(beside),
@@ -637,7 +640,7 @@ def diagnose(
         "takes_inputs": asked is None or asked.takes_inputs,
         "experiment": experiment,
     }
-    return run(checked, asked, how, progress, notes)
+    return run(checked, asked, how, progress, notes, off=dict(zip(json.loads(checked.session)["effects"], off)))
 
 
 def run(
@@ -646,8 +649,11 @@ def run(
     how: dict[str, Any],
     progress: Callable[[str], Any] | None,
     notes: list[str],
+    *,
+    off: dict[str, float],
+    earlier: Fix | None = None,
 ) -> Diagnosis:
-    """Diagnose a checked problem. `notes` precede the notes of the diagnosis."""
+    """Diagnose a checked problem. `notes` precede the notes of the diagnosis. For `off` and `earlier` see `Again`."""
     session = json.loads(checked.session)
     if asked is not None:
         asked.bind({**session, "columns": checked.columns})
@@ -655,7 +661,7 @@ def run(
         text, page, curves, functions, trial, fixed = checked.diagnose(asked, json.dumps(how), report)
     answer = json.loads(text)
     answer["notes"] = notes + answer["notes"]
-    again = None if fixed is None else Again(fixed, asked, how)
+    again = None if fixed is None else Again(fixed, asked, how, session, off, earlier)
     return Diagnosis(answer, page, curves, functions, trial, session, again)
 
 

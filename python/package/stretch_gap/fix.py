@@ -5,30 +5,42 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from html import escape
+from types import NoneType
 from typing import Any
+
+import numpy as np
 
 from . import figures, html
 from . import problem as entries
 from ._stretch import Fixed, StretchError, comment, identifier
+from .around import Around, around
 from .recordings import Array
-from .simulator import Asked
+from .simulator import Asked, Named
 
 
 @dataclass(frozen=True)
 class Again:
-    """Inputs of a run of the fixed simulator: the fixed problem, the user's simulator, and the options of the diagnosis."""
+    """Inputs of a run of the fixed simulator.
+
+    `fixed` is the fixed problem, `asked` the user's simulator, `how` the options and `session` the session of the diagnosis.
+    `off` holds the values at which the simulator's own effects do nothing. `earlier` is the fix that was diagnosed again.
+    """
 
     fixed: Fixed
     asked: Asked | None
     how: dict[str, Any]
+    session: dict[str, Any]
+    off: dict[str, float]
+    earlier: Fix | None = None
 
 
 @dataclass(frozen=True)
 class Fix:
     """Changes that the simulator needs: re-tuned parameters and the named effects.
 
-    `Diagnosis.fix` returns this class.
+    `Diagnosis.fix` returns this class. A fix is also a simulator: call it in place of the user's own.
 
     Attributes
     ----------
@@ -45,6 +57,115 @@ class Fix:
     effects: dict[str, dict[str, float]]
     code: str
     _again: Again | None = field(default=None, repr=False)
+    _written: tuple[Sequence[Mapping[str, Any]], Mapping[str, str]] = field(default=((), {}), repr=False)
+
+    def __post_init__(self) -> None:
+        asked = self._again and self._again.asked
+        if asked:  # `Asked` looks here for the form of a simulator, and finds that of the user's
+            vars(self).update({"simulate": self, "batch": asked.batch} if asked.many else {}, __signature__=asked.signature)
+
+    def __call__(self, params: Any = None, effects: Any = None, *more: Any, **named: Any) -> Any:
+        """Run the fixed simulator: the user's simulator with the re-tuned parameters, and the named effects around it.
+
+        A fix is called as the user's simulator is: if that is an object with a method `simulate`, so is the fix. `diagnose` takes
+        a fix as its simulator, but `Fix.diagnose` is faster. The sample time must be that of the diagnosis. An effect around the
+        simulator begins at rest in each recording, at the first value of its column.
+
+        Parameters
+        ----------
+        params : dict of str to float, or array_like of shape (n, parameters), optional
+            Parameters in place of the re-tuned ones. A dict need not contain all of them.
+        effects : dict of str to float, or array_like of shape (n, effects), optional
+            Effects that the simulator itself implements. By default they do nothing. A named effect always has its fitted values.
+        *more, **named : Any
+            Further arguments of the user's simulator, such as `inputs`. The named effects at the inputs alter `inputs`.
+
+        Returns
+        -------
+        ndarray, or dict of str to ndarray
+            What the user's simulator returns, altered by the named effects at the outputs.
+
+        Raises
+        ------
+        StretchError
+            If an effect cannot be applied from outside the simulator, because it depends on more than the column that it alters.
+            If there is no simulator to run, because the diagnosis was read from text, names no effect, or ran the simulator of a
+            `problem.toml`. If an argument is unknown or missing.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import stretch_gap
+        >>> time_s = np.arange(0, 60, 0.01)
+        >>> force = 20 * np.sin(1.3 * time_s) + 10 * np.sin(3.1 * time_s)
+        >>> noise = 0.01 * np.random.default_rng(0).normal(size=time_s.size)
+        >>> data = {"time_s": time_s, "force_N": force, "length_mm": 2.1 * np.clip(force, -15, 15) + noise}
+        >>> def spring(params, effects, inputs):
+        ...     return params["compliance"] * inputs["force_N"]
+        >>> question = {"output": "length_mm", "inputs": "force_N", "wrap": "output.saturation"}
+        >>> found = stretch_gap.diagnose(spring, data, parameters={"compliance": (2.0, 0.2)}, **question)
+        >>> fixed = found.fix()
+        >>> np.round(fixed(inputs={"force_N": np.linspace(0, 30, 4)}))
+        array([ 0., 21., 31., 31.])
+        >>> stretch_gap.diagnose(fixed, data, **question).verdict
+        'no_gap'
+        """
+        again, asked = self._called()
+        named.update(zip(list(asked.signature.parameters)[2:], more))
+        values = {**self.parameters, **_by_name("parameter", params, asked.parameters)}
+        own = {**again.off, **_by_name("effect", effects, asked.effects)}
+        for effect, found in self.effects.items():
+            own.update({key: x for name, x in found.items() for key in (effect, f"{effect}.{name}") if key in asked.effects})
+        for name in asked.effects:
+            if name not in own:
+                raise StretchError(f"effects: there is no value of {name}; give the value at which it does nothing")
+        spans = [trial.samples for trial in named.get("trials", [] if asked.is_called_once_a_trial else asked.spans)]
+        for one in self._around:
+            if one.is_in_front and "inputs" not in named:
+                raise StretchError(f"{one.name} alters {one.columns[0]}, but there are no inputs; give the argument inputs")
+            if one.is_in_front:
+                named["inputs"] = one.act(named["inputs"], spans)
+        call = again.earlier or asked.call
+        if asked.many:
+            models = next((len(table) for table in (params, effects) if not isinstance(table, (Mapping, NoneType))), 1)
+            answer = call(_table(values, asked.parameters, models), _table(own, asked.effects, models), **named)
+        else:
+            answer = call(values, own, **named)
+        outputs = answer if isinstance(answer, dict) else {again.session["stages"][named.get("stage", 0)]["output"]: answer}
+        for one in self._around:
+            if not one.is_in_front:
+                outputs = one.act(outputs, spans)
+        return outputs if isinstance(answer, dict) else next(iter(outputs.values()))
+
+    def begin(self, session: Mapping[str, Any]) -> None:
+        """Take new recordings. `diagnose` calls this before it calls the fix.
+
+        Parameters
+        ----------
+        session : dict
+            What stays the same for all models, as for the method `begin` of the user's simulator.
+
+        Raises
+        ------
+        StretchError
+            If the fix cannot be called.
+        """
+        again, asked = self._called()
+        asked.bind({**session, "parameters": again.session["parameters"], "effects": again.session["effects"]})
+
+    @cached_property
+    def _around(self) -> list[Around]:
+        return around(*self._written, self._runnable().session["stages"])
+
+    def _called(self) -> tuple[Again, Asked]:
+        again = self._runnable()
+        if again.asked is None:
+            raise StretchError(
+                "the simulator of the problem.toml runs in another process and cannot be called; diagnose with its object or "
+                "function in place of None, or use the methods predict and diagnose of the fix"
+            )
+        _ = self._around  # effects that cannot be applied are refused first
+        return again, again.asked
 
     def predict(
         self, data: entries.Data, *, rate_hz: float | None = None, progress: Callable[[str], Any] | None = None
@@ -118,7 +239,8 @@ class Fix:
 
         again = self._runnable()
         others = [] if data is None else entries.recorded(data, rate_hz, again.fixed.columns)
-        return run(again.fixed.problem(others, data is not None), again.asked, again.how, progress, [])
+        problem = again.fixed.problem(others, data is not None)
+        return run(problem, again.asked, again.how, progress, [], off=again.off, earlier=self)
 
     def _runnable(self) -> Again:
         if self._again is None:
@@ -240,6 +362,24 @@ class Prediction:
         return f"<p><b>{escape(self.sentence)}</b></p>" + html.table(head, rows) + html.notes(self.notes)
 
 
+def _by_name(what: str, given: Any, names: Sequence[str]) -> dict[str, Any]:
+    """Return values by name, from a dict, from a table with a column for each name, or from None."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        given = dict(zip(getattr(given, "names", names), np.asarray(given).T))
+    for name in given:
+        if name not in names:
+            raise StretchError(f"there is no {what} {name}; there are {', '.join(names) or 'none'}")
+    return dict(given)
+
+
+def _table(values: Mapping[str, Any], names: Sequence[str], models: int) -> Named:
+    """Return the values as a table with a row for each model."""
+    columns = [np.broadcast_to(values[name], models) for name in names]
+    return Named.of(np.array(columns, dtype=np.float64).reshape(len(names), models).T, names)
+
+
 def fix(
     parameters: Mapping[str, float],
     found: Mapping[str, dict[str, float]],
@@ -262,4 +402,4 @@ def fix(
         one = described.get(name, {})
         words = [f"{name}: {one.get('words', '')}", f"  {one.get('equation', '')}"]
         lines += ["", *map(comment, words), f"{identifier(name)} = {values!r}"]
-    return Fix(dict(parameters), dict(found), "\n".join(lines) + "\n", again)
+    return Fix(dict(parameters), dict(found), "\n".join(lines) + "\n", again, (implement, functions))

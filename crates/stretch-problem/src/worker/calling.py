@@ -96,13 +96,18 @@ class Asked:
         self.batch = max(1, int(getattr(simulator, "batch", BATCH))) if self.many else 1
         self.optional = self._optional()
 
+    @property
+    def signature(self) -> inspect.Signature:
+        """Arguments that the simulator takes."""
+        try:
+            return inspect.signature(self.call)
+        except (TypeError, ValueError):  # a builtin
+            return inspect.signature(lambda params, effects: None)
+
     def _optional(self) -> set[str]:
         """Return the optional arguments that the simulator takes."""
         known = {"inputs", "first", "trials", "stage"}
-        try:
-            taken = inspect.signature(self.call).parameters
-        except (TypeError, ValueError):  # a builtin
-            return set()
+        taken = self.signature.parameters
         if any(p.kind is inspect.Parameter.VAR_KEYWORD for p in taken.values()):
             return known
         return known & set(taken)

@@ -44,6 +44,11 @@ pub type Measure = fn(&[f64]) -> f64;
 
 /// A property that kinds of one family share. Data may determine this property without distinguishing the kinds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Family {
     /// A delay, in seconds.
     Late,

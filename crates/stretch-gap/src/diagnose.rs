@@ -452,7 +452,7 @@ fn report(
         Findings {
             judged: &judged,
             gap: evidence.gap,
-            first: candidates.first(),
+            candidates: &candidates,
             shares: &shares,
             unexplained: unexplained.as_ref(),
             gross: cause.gross,
@@ -461,7 +461,8 @@ fn report(
         simulator,
         &evidence,
     );
-    let (naming, named) = (judged.naming(), answer.named());
+    let naming = judged.naming();
+    let named = answer.effects().iter().map(|effect| effect.name.clone()).collect();
     let mut notes = answer_notes(&answer, &sanity, simulator, &evidence);
     notes.extend(gross_error_notes(cause.problem).into_iter().map(Note::from));
     notes.extend(lost_note(runs));

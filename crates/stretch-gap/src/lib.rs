@@ -59,6 +59,7 @@ pub use verdict::{
     answer::{Answer, Closed, MissingEffect},
     coverage::TooLittle,
     diagnosis::{Diagnosis, NextExperiment, Transfer, TransferError, Unexplained, VerdictKind},
+    family::EffectFamily,
     next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment},
     note::Note,
 };

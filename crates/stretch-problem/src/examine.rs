@@ -11,7 +11,6 @@ use stretch_gap::{Diagnosis, EffectValue, Evidence, GapError, Note, Options, dia
 use stretch_sim::{Quantity, Sketch};
 
 use crate::{
-    black_box::Agreed,
     fix::{Fix, Fixed, NoFix},
     implement::Implementation,
     problem::Problem,
@@ -32,9 +31,6 @@ pub struct Examined {
     pub experiment: Option<Trial>,
     /// Code for the named effects.
     pub implementations: Vec<Implementation>,
-    /// Families of effects that the data cannot distinguish, with the quantity on which the members
-    /// agree.
-    pub families: Vec<Agreed>,
     /// The fixed simulator as a file, or why there is no such file.
     pub fix: Result<Fix, NoFix>,
 }
@@ -106,17 +102,14 @@ impl Problem {
             proposal = source.next(&diagnosis, &evidence)?;
         }
         diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
-        let families = source.families(&diagnosis);
         let notes = &mut diagnosis.notes;
         notes.splice(0..0, source.notes().into_iter().map(Note::from));
-        notes.extend(families.iter().map(Agreed::note));
         notes.extend(source.afterwards().into_iter().map(Note::from));
         Ok(Examined {
             name: self.name.clone(),
             seed: options.seed,
             experiment: proposal.map(|p| p.trial),
             implementations: source.implementations(&diagnosis, &evidence),
-            families,
             fix: source.fixed(&diagnosis, &evidence),
             diagnosis,
             evidence,
@@ -132,7 +125,6 @@ impl Examined {
         let written = Written {
             diagnosis: &self.diagnosis,
             implement: self.implementations.iter().map(WrittenEffect::of).collect(),
-            families: self.families.iter().map(WrittenFamily::of).collect(),
             fixed_rig: fixed.and_then(|file| match file {
                 Fixed::Rig(rig) => Some(rig),
                 Fixed::Problem(_) => None,
@@ -185,8 +177,6 @@ struct Written<'a> {
     diagnosis: &'a Diagnosis,
     /// The named effects with equation, numbers, meaning of input and output, and initial state.
     implement: Vec<WrittenEffect<'a>>,
-    /// Families of effects of which these data cannot tell the members apart.
-    families: Vec<WrittenFamily<'a>>,
     /// The rig file that `--fix` writes, or null.
     #[schemars(with = "Option<serde_json::Map<String, Value>>")]
     fixed_rig: Option<&'a RigFile>,
@@ -232,19 +222,6 @@ struct WrittenQuantity<'a> {
     meaning: &'a str,
 }
 
-/// Effects that the data do not tell apart.
-#[derive(Serialize, JsonSchema)]
-struct WrittenFamily<'a> {
-    /// The effects, the most probable first.
-    names: &'a [String],
-    /// Range of the quantity that they agree on.
-    range: [f64; 2],
-    /// Unit of the range.
-    unit: &'a str,
-    /// The same in a sentence.
-    sentence: String,
-}
-
 impl<'a> WrittenEffect<'a> {
     fn of(one: &'a Implementation) -> Self {
         let sketch = one.sketch.as_ref();
@@ -265,12 +242,5 @@ impl<'a> WrittenQuantity<'a> {
     fn of(quantity: &'a Quantity) -> Self {
         let Quantity { name, unit, meaning, .. } = quantity;
         Self { name, unit, meaning }
-    }
-}
-
-impl<'a> WrittenFamily<'a> {
-    fn of(agreed: &'a Agreed) -> Self {
-        let Agreed { names, range, unit, .. } = agreed;
-        Self { names, range: *range, unit, sentence: agreed.note().to_string() }
     }
 }

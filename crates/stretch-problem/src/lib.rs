@@ -21,9 +21,9 @@ pub mod worker;
 mod wrap;
 
 pub use black_box::{
-    Agreed, AlteredColumn, Argument, Ask, BlackBox, Checked, Closure, Input, OwnEffect, Parameter,
+    AlteredColumn, Argument, Ask, BlackBox, Checked, Closure, Input, OwnEffect, Parameter,
     ProblemSpec, RecordedSession, SessionColumn, SessionPart, SessionStage, Source, SourceError,
-    StageEntry, State, TrialFile, agreed, closure,
+    StageEntry, State, TrialFile, closure,
 };
 pub use by_trial::{Apart, ByTrial, Heterogeneity, RunFit};
 pub use causes::{Causes, causes};

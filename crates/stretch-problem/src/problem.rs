@@ -7,7 +7,7 @@ use stretch_recording::ReadOptions;
 use stretch_sim::Catalogue;
 
 use crate::{
-    black_box::{Agreed, BlackBox, ProblemSpec},
+    black_box::{BlackBox, ProblemSpec},
     error::ProblemError,
     file::IN_FOLDER,
     fix::{Fix, NoFix},
@@ -26,12 +26,6 @@ pub trait Diagnosable: Simulator + Debug + Send {
 
     /// Notes that are known only after the diagnosis, in sentences.
     fn afterwards(&self) -> Vec<String> {
-        Vec::new()
-    }
-
-    /// Families of effects that a diagnosis cannot distinguish, with the quantity on which the
-    /// members agree.
-    fn families(&self, _diagnosis: &Diagnosis) -> Vec<Agreed> {
         Vec::new()
     }
 

@@ -15,8 +15,8 @@ use super::{
 pub(crate) fn headline(subject: &Subject<'_>) -> String {
     let d = subject.diagnosis;
     match &d.answer {
-        Some(Answer::Missing { .. }) => {
-            format!("{}The simulator lacks {}.", d.preface(), to_add(&d.named, &d.tied))
+        Some(Answer::Missing { effects, .. }) => {
+            format!("{}The simulator lacks {}.", d.preface(), Answer::effects_in_words(effects))
         }
         // a probability holds only among the candidates, so the text adds this condition
         _ => d.in_sentences(&|p| format!("{} {GIVEN}", percent(p))).replace(" %", "\u{a0}%"),
@@ -25,24 +25,6 @@ pub(crate) fn headline(subject: &Subject<'_>) -> String {
 
 /// The condition of every probability.
 pub(crate) const GIVEN: &str = "given this catalogue";
-
-/// Named effects, and effects that may replace them.
-fn to_add(named: &[String], tied: &[String]) -> String {
-    match (named, tied) {
-        (_, []) => listed(named),
-        ([one], tied) => {
-            let all: Vec<&str> = std::iter::once(one).chain(tied).map(String::as_str).collect();
-            format!("{}: these data cannot tell which", all.join(" or "))
-        }
-        (_, tied) => {
-            format!(
-                "{} (or {} instead of one of them: these data cannot tell)",
-                listed(named),
-                tied.join(" or ")
-            )
-        }
-    }
-}
 
 /// The next step, in a sentence.
 fn to_do(d: &Diagnosis) -> String {
@@ -92,7 +74,10 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         .max_by(|a, b| a.share.total_cmp(&b.share))
         .map_or_else(String::new, |s| format!("{} ({} of the gap)", s.stage, percent(s.share)));
     let fix = match d.verdict {
-        VerdictKind::Effect | VerdictKind::Partial => format!("Add {}.", to_add(&d.named, &d.tied)),
+        VerdictKind::Effect | VerdictKind::Partial => {
+            let effects = d.answer.as_ref().map_or(&[][..], Answer::effects);
+            format!("Add {}.", Answer::effects_in_words(effects))
+        }
         VerdictKind::Parameters => {
             let moved = moved(d);
             if moved.is_empty() {
@@ -113,7 +98,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
             let rivals: Vec<String> =
                 d.ambiguous.iter().filter(|n| !d.named.contains(n)).cloned().collect();
             let rest = if !d.tied.is_empty() {
-                format!("a tie with {}", listed(&d.tied))
+                "that is the probability of all alternatives together".to_owned()
             } else if rivals.is_empty() && d.answer.as_ref().is_some_and(Answer::leaves_more_than_noise) {
                 "nothing else that was tried explains as much, and more than noise is left".to_owned()
             } else if rivals.is_empty() {
@@ -121,7 +106,8 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
             } else {
                 format!("these data cannot rule out {}", listed(&rivals))
             };
-            format!("Probability {} {GIVEN}: {rest}.", percent(c.probability))
+            let p = d.answer.as_ref().and_then(Answer::probability).unwrap_or(c.probability);
+            format!("Probability {} {GIVEN}: {rest}.", percent(p))
         }
         (VerdictKind::Record, Some(c)) if !d.gross.iter().any(Gross::is_plain) => {
             format!("Probability {} compared with every set of effects, {GIVEN}.", percent(c.probability))

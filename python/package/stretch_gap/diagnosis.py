@@ -204,10 +204,12 @@ class Diagnosis:
     def families(self) -> list[dict[str, Any]]:
         """Groups of effects that these data cannot distinguish, list of dicts.
 
-        The effects of a group agree on one quantity, for example the delay at the output. Each dict holds `names` (the effects,
-        the most probable first), `range` and `unit` (least and greatest value of that quantity), and `sentence`.
+        The effects of a group agree on one property, for example the delay at the output. Each dict holds `names` (the effects,
+        the named one first), `titles` (their kinds in words), `property` (`late` or `loop`), `place`, and `range` and `unit`
+        (least and greatest value of the property).
         """
-        return list(self._answer.get("families", []))
+        effects = (self._answer.get("answer") or {}).get("effects", [])
+        return [effect["family"] for effect in effects if effect.get("family")]
 
     @property
     def next_experiment(self) -> dict[str, Any] | None:

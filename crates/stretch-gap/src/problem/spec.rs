@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use serde::Serialize;
-use stretch_effects::EffectParameter;
+use stretch_effects::{EffectParameter, Kind};
 
 use crate::problem::noise::Noise;
 
@@ -150,6 +150,9 @@ pub struct EffectSpec {
     /// If the effect improves the fit only through these errors, it shows only an error that the
     /// two outputs have in common.
     pub reads: Option<usize>,
+    /// The effect's kind, if it is in the catalogue of kinds.
+    #[serde(skip)]
+    pub kind: Option<&'static Kind>,
 }
 
 impl EffectSpec {
@@ -177,6 +180,7 @@ impl EffectSpec {
             drifts: false,
             twins: Vec::new(),
             reads: None,
+            kind: None,
         }
     }
 

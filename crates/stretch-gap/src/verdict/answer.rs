@@ -15,6 +15,7 @@ use crate::{
     verdict::{
         coverage::TooLittle,
         diagnosis::{Unexplained, VerdictKind},
+        family::EffectFamily,
         judge::{Judged, Overruled},
         naming::Naming,
     },
@@ -138,6 +139,9 @@ pub struct MissingEffect {
     pub name: String,
     /// Effects that may be missing instead.
     pub alternatives: Vec<String>,
+    /// The effect and those alternatives that do the same, described by what they do.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub family: Option<EffectFamily>,
     /// Share of the gap that it closes.
     pub closes: f64,
     /// Whether one of its parameters is at an end of its range.
@@ -156,18 +160,19 @@ pub struct Closed {
     /// Whether much more is left on the fitted trials than on the test trials.
     pub fits_worse: bool,
     /// Probability of the hypothesis, assuming that the catalogue is complete up to one unknown
-    /// cause.
+    /// cause. If alternatives are listed, it is the probability that one of them is right.
     pub probability: f64,
 }
 
 impl Closed {
-    fn of(candidate: &Candidate, excess: f64) -> Self {
+    /// Describes a candidate among candidates with the same effects up to a tie.
+    fn of(candidate: &Candidate, probability: f64, excess: f64) -> Self {
         Self {
             share: candidate.closed,
             interval: candidate.closed_ci,
             left: multiple(excess),
             fits_worse: candidate.fits_worse(),
-            probability: candidate.probability,
+            probability,
         }
     }
 }
@@ -177,9 +182,9 @@ impl Closed {
 pub(crate) struct Findings<'a> {
     pub(crate) judged: &'a Judged,
     pub(crate) gap: Excess,
-    /// The most probable candidate. All candidates, including a cause outside the catalogue, share
-    /// the probability 1.
-    pub(crate) first: Option<&'a Candidate>,
+    /// The candidates, the most probable first. All of them, including a cause outside the
+    /// catalogue, share the probability 1.
+    pub(crate) candidates: &'a [Candidate],
     pub(crate) shares: &'a [EffectShare],
     /// The part of the gap that is left, if the effects explain only a part.
     pub(crate) unexplained: Option<&'a Unexplained>,
@@ -223,18 +228,21 @@ impl Answer {
         let ended =
             ended.map(|(spec, value)| (spec.name.clone(), (value - spec.nominal) / spec.sd));
         let ended = ended.collect();
-        match (judged.seen, findings.first) {
+        let missing =
+            || missing_effects(&judged.seen_naming, shares, findings.candidates, simulator);
+        match (judged.seen, findings.candidates.first()) {
             (VerdictKind::Record, first) => {
                 let first = first.filter(|_| !gross.iter().any(Gross::is_plain));
-                let corrected = first.map(|first| Closed::of(first, gap.left));
+                let corrected = first.map(|first| Closed::of(first, first.probability, gap.left));
                 Self::WrongRecord { errors: gross.to_vec(), corrected }
             }
             (VerdictKind::Effect, Some(first)) => {
-                let effects = missing_effects(&judged.seen_naming, shares);
-                Self::Missing { effects, closes: Closed::of(first, gap.left), faint, ended }
+                let probability = judged.seen_naming.probability(findings.candidates);
+                let closes = Closed::of(first, probability, gap.left);
+                Self::Missing { effects: missing(), closes, faint, ended }
             }
             (VerdictKind::Partial, Some(first)) => {
-                let mut effects = missing_effects(&judged.seen_naming, shares);
+                let mut effects = missing();
                 effects.sort_by(|a, b| b.closes.total_cmp(&a.closes));
                 let rest = findings.unexplained.cloned();
                 Self::Partly {
@@ -270,13 +278,20 @@ impl Answer {
         }
     }
 
-    /// Returns the named effects, in the order of the sentence.
-    pub(crate) fn named(&self) -> Vec<String> {
+    /// Returns the missing effects, in the order of the sentence.
+    pub fn effects(&self) -> &[MissingEffect] {
         match self {
-            Self::Missing { effects, .. } | Self::Partly { effects, .. } => {
-                effects.iter().map(|effect| effect.name.clone()).collect()
-            }
-            _ => Vec::new(),
+            Self::Missing { effects, .. } | Self::Partly { effects, .. } => effects,
+            _ => &[],
+        }
+    }
+
+    /// Returns the probability that the missing effects or their alternatives are right; `None` for
+    /// another answer.
+    pub fn probability(&self) -> Option<f64> {
+        match self {
+            Self::Missing { closes, .. } => Some(closes.probability),
+            _ => None,
         }
     }
 
@@ -291,6 +306,7 @@ impl Answer {
                 for effect in effects {
                     effect.name = rename(&effect.name);
                     all(&mut effect.alternatives);
+                    effect.family.iter_mut().for_each(|family| all(&mut family.names));
                 }
                 all(faint);
             }
@@ -307,13 +323,20 @@ impl Answer {
 }
 
 /// Returns the named effects with their alternatives, in the order of the naming.
-pub(crate) fn missing_effects(naming: &Naming, shares: &[EffectShare]) -> Vec<MissingEffect> {
+pub(crate) fn missing_effects(
+    naming: &Naming,
+    shares: &[EffectShare],
+    candidates: &[Candidate],
+    simulator: &dyn Simulator,
+) -> Vec<MissingEffect> {
     let one = |name: &String| {
         let own = shares.iter().find(|s| s.effect == *name);
         let ties = naming.ties.iter().filter(|(named, _)| named == name);
+        let alternatives: Vec<String> = ties.map(|(_, other)| other.clone()).collect();
         MissingEffect {
             name: name.clone(),
-            alternatives: ties.map(|(_, other)| other.clone()).collect(),
+            family: EffectFamily::of(name, &alternatives, candidates, simulator),
+            alternatives,
             closes: own.map_or(0.0, |s| s.closes),
             at_bound: shares.iter().any(|s| s.effect == *name && s.at_bound),
         }

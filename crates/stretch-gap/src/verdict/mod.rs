@@ -10,6 +10,7 @@
 pub(crate) mod answer;
 pub(crate) mod coverage;
 pub(crate) mod diagnosis;
+pub(crate) mod family;
 pub(crate) mod judge;
 pub(crate) mod naming;
 pub(crate) mod next_experiment;

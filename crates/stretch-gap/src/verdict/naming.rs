@@ -50,18 +50,26 @@ impl Naming {
         let rivals = candidates.iter().enumerate().skip(1);
         let rivals = rivals.filter(|(i, c)| *i < held || closes_alike(c)).map(|(_, c)| c);
         let mut ties = Vec::new();
-        for rival in rivals.filter(|c| c.effects.len() == first.effects.len()) {
-            let lost: Vec<&String> =
-                first.effects.iter().filter(|e| !rival.effects.contains(e)).collect();
-            let new: Vec<&String> =
-                rival.effects.iter().filter(|e| !first.effects.contains(e)).collect();
-            if let ([lost], [new]) = (&lost[..], &new[..])
+        for rival in rivals {
+            if let Some((lost, new)) = replaced(&first.effects, &rival.effects)
                 && named.contains(lost)
             {
-                ties.push(((*lost).clone(), (*new).clone()));
+                ties.push((lost.clone(), new.clone()));
             }
         }
         Self { named, ties, faint }
+    }
+
+    /// Returns the probability that the first candidate, or one that differs from it by a tie, is
+    /// right.
+    pub(crate) fn probability(&self, candidates: &[Candidate]) -> f64 {
+        let Some(first) = candidates.first() else { return 0.0 };
+        let is_tied = |c: &&Candidate| {
+            let tie = replaced(&first.effects, &c.effects);
+            tie.is_some_and(|(lost, new)| self.ties.contains(&(lost.clone(), new.clone())))
+        };
+        let tied: f64 = candidates.iter().filter(is_tied).map(|c| c.probability).sum();
+        (first.probability + tied).min(1.0)
     }
 
     /// Returns every effect that is an alternative to a named one, once.
@@ -73,6 +81,17 @@ impl Naming {
             }
         }
         tied
+    }
+}
+
+/// Returns the effect of the first set that the second set lacks, and the one in its place, if the
+/// sets differ in nothing else.
+fn replaced<'a>(first: &'a [String], second: &'a [String]) -> Option<(&'a String, &'a String)> {
+    let lost: Vec<&String> = first.iter().filter(|e| !second.contains(e)).collect();
+    let new: Vec<&String> = second.iter().filter(|e| !first.contains(e)).collect();
+    match (&lost[..], &new[..]) {
+        ([lost], [new]) => Some((lost, new)),
+        _ => None,
     }
 }
 
@@ -115,6 +134,7 @@ mod tests {
             (&["slack".to_owned()][..], &["sag".to_owned()][..])
         );
         assert_eq!(naming.ties, [("slack".into(), "saturation".into())]);
+        assert!((naming.probability(&candidates) - 0.96).abs() < 1e-12);
         // In a short recording, a set that closes as much is a tie, whatever its probability.
         let short = Naming::of(&candidates, &shares, &Thresholds::frozen(), true);
         assert_eq!(short.ties.len(), 1);

@@ -5,6 +5,7 @@ use crate::{
     verdict::{
         answer::{Answer, Closed, MissingEffect},
         diagnosis::Diagnosis,
+        family::EffectFamily,
     },
 };
 
@@ -148,6 +149,11 @@ impl Answer {
         }
     }
 
+    /// Lists missing effects with their alternatives.
+    pub fn effects_in_words(effects: &[MissingEffect]) -> String {
+        effects.iter().map(alternatives).collect::<Vec<_>>().join(" and ")
+    }
+
     /// Describes the answer in plain sentences; `probability` formats a probability.
     pub fn in_sentences(&self, probability: &dyn Fn(f64) -> String) -> String {
         match self {
@@ -170,15 +176,14 @@ impl Answer {
                 )
             }
             Self::Missing { effects, closes, faint, ended } => {
-                let names: Vec<String> = effects.iter().map(alternatives).collect();
                 format!(
                     "The simulator lacks {}: {} {} of the gap on trials that were not fitted, and {}.",
-                    names.join(" and "),
-                    if names.len() > 1 { "together they close" } else { "it closes" },
+                    Self::effects_in_words(effects),
+                    if effects.len() > 1 { "together they close" } else { "it closes" },
                     closed(closes),
                     left_with(closes, probability)
                 ) + &at_ends(ended)
-                    + &below(effects, faint)
+                    + &also_seen(faint)
             }
             Self::Partly { effects, closes, left, rest, faint, ended } => {
                 let much = if *closes >= MOST { "Mostly" } else { "In part" };
@@ -200,7 +205,7 @@ impl Answer {
                 let names = names.join(", ");
                 format!("{much} {names} of the gap on trials that were not fitted. {rest}")
                     + &at_ends(ended)
-                    + &below(effects, faint)
+                    + &also_seen(faint)
             }
             Self::WrongRecord { errors, corrected: None } => {
                 sentence(errors) + " Nothing can be said of effects until that is corrected."
@@ -278,11 +283,17 @@ impl MissingEffect {
     }
 }
 
-/// Lists an effect and its alternatives.
+/// Lists an effect and its alternatives. Alternatives that do the same are described together.
 fn alternatives(effect: &MissingEffect) -> String {
-    let all: Vec<&str> =
-        std::iter::once(&effect.name).chain(&effect.alternatives).map(String::as_str).collect();
-    all.join(" or ")
+    let family = effect.family.as_ref();
+    let is_other = |name: &&String| family.is_none_or(|family| !family.names.contains(name));
+    let own = family.map_or_else(|| effect.name.clone(), EffectFamily::words);
+    let others = effect.alternatives.iter().filter(is_other).cloned();
+    let all = std::iter::once(own).chain(others).collect::<Vec<_>>().join(" or ");
+    match (effect.is_tied(), family) {
+        (true, None) => format!("{all} (these data cannot tell which)"),
+        _ => all,
+    }
 }
 
 /// Lists an effect and its alternatives, with the share of the gap that the effect closes.
@@ -293,7 +304,10 @@ fn with_share(effect: &MissingEffect) -> String {
         share => format!("{:.0} %", 100.0 * share),
     };
     let end = if effect.at_bound { ", at the end of its range" } else { "" };
-    format!("{} ({share}{end})", alternatives(effect))
+    match effect.is_tied() {
+        true => format!("{} with {share}{end}", alternatives(effect)),
+        false => format!("{} ({share}{end})", effect.name),
+    }
 }
 
 /// Lists effects that were found but are too small to matter.
@@ -320,14 +334,10 @@ fn at_ends(ended: &[(String, f64)]) -> String {
     }
 }
 
-/// Describes ties and faint effects, for the text after the first sentence.
-fn below(effects: &[MissingEffect], faint: &[String]) -> String {
-    let mut out = String::new();
-    if effects.iter().any(MissingEffect::is_tied) {
-        out += " These data cannot tell which with 95 % probability.";
+/// Lists faint effects, for the text after the first sentence.
+fn also_seen(faint: &[String]) -> String {
+    match faint.is_empty() {
+        true => String::new(),
+        false => format!(" Also seen, faint: {}.", faint.join(", ")),
     }
-    if !faint.is_empty() {
-        out += &format!(" Also seen, faint: {}.", faint.join(", "));
-    }
-    out
 }

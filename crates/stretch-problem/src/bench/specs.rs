@@ -30,6 +30,7 @@ pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
         drifts: effect.drifts(),
         twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
         reads: None,
+        kind: None,
     }
 }
 

@@ -6,7 +6,7 @@ use std::num::NonZeroUsize;
 use stretch_data::{EffectEntry, Remarks};
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator, next_experiment};
 
-use super::{Agreed, BlackBox, agreed, catalogue::Acting, spec::ProblemSpec};
+use super::{BlackBox, catalogue::Acting, spec::ProblemSpec};
 use crate::{
     fix::{Chosen, Fix, Fixed, Meaning, NoFix},
     implement::Implementation,
@@ -62,10 +62,6 @@ impl Diagnosable for BlackBox {
         notes.extend(self.coupled.get().and_then(|coupled| coupled.note.clone()));
         notes.extend(self.undeclared.notes(&self.problem));
         notes
-    }
-
-    fn families(&self, diagnosis: &Diagnosis) -> Vec<Agreed> {
-        agreed(&self.problem, diagnosis)
     }
 
     fn next(

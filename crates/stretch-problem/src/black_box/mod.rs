@@ -7,7 +7,6 @@ pub(crate) mod columns;
 mod coupled;
 mod experiments;
 mod facts;
-mod families;
 mod fixed;
 mod inner_run;
 mod linear;
@@ -33,7 +32,6 @@ use runs::{Altered, Inner, Runs};
 use undeclared::Undeclared;
 
 pub use checked::Checked;
-pub use families::{Agreed, agreed};
 pub use source::{
     AlteredColumn, Ask, Closure, RecordedSession, SessionColumn, SessionPart, SessionStage, Source,
     SourceError, closure,

@@ -348,6 +348,7 @@ impl Placed {
         spec.starts.clone_from(&self.starts);
         spec.is_found = self.kind.find.is_some();
         spec.drifts = self.kind.drifts;
+        spec.kind = Some(self.kind);
         let is_twin = |other: &&Self| {
             other.site.stage == self.site.stage
                 && other.name != self.name

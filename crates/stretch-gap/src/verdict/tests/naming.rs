@@ -6,6 +6,7 @@ use crate::{
     evidence::{candidates::Candidate, shares::EffectShare},
     numerics::random::RandomGenerator,
     problem::thresholds::Thresholds,
+    toys::{Law, Toy},
     verdict::{answer::missing_effects, naming::Naming},
 };
 
@@ -69,6 +70,7 @@ fn drawn(random: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>, boo
 fn names_part_the_first_set() {
     let mut random = RandomGenerator::new(4, 0);
     let thresholds = Thresholds::frozen();
+    let simulator = Toy::of(&[Law::Line]).measured(1);
     let mut ties = 0;
     for _ in 0..5000 {
         let (candidates, shares, is_short) = drawn(&mut random);
@@ -83,7 +85,7 @@ fn names_part_the_first_set() {
         ties += naming.ties.len();
         let tied = naming.tied();
         assert_eq!(tied.iter().collect::<BTreeSet<_>>().len(), tied.len());
-        let told = missing_effects(&naming, &shares);
+        let told = missing_effects(&naming, &shares, &candidates, &simulator);
         assert!(told.iter().map(|effect| &effect.name).eq(&naming.named));
         let alternatives: usize = told.iter().map(|effect| effect.alternatives.len()).sum();
         assert_eq!(alternatives, naming.ties.len());

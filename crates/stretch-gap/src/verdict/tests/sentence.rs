@@ -187,7 +187,7 @@ impl Case {
         let findings = Findings {
             judged: &judged,
             gap: Excess { raw, retuned, left },
-            first: Some(&self.first),
+            candidates: std::slice::from_ref(&self.first),
             shares: &self.shares,
             unexplained: self.unexplained.as_ref(),
             gross: &self.gross,

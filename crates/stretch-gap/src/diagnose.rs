@@ -46,7 +46,8 @@ use crate::{
         note::Note,
         notes::{
             answer_notes, detection_limit_note, extrapolation_notes, gross_error_notes,
-            implausible_noise_notes, lost_note, recorder_notes, swing_notes,
+            implausible_noise_notes, lost_note, recorder_notes, retuning_notes, start_notes,
+            swing_notes,
         },
     },
 };
@@ -481,6 +482,10 @@ fn report(
     notes.extend(reservations.iter().cloned());
     notes.extend(searched.problem.starts.note().map(Note::from));
     notes.extend(recorder_notes(cause.problem).into_iter().map(Note::from));
+    if evidence.gap.retuned > thresholds.least_gap {
+        let own = start_notes(simulator, &evidence).into_iter();
+        notes.extend(own.chain(retuning_notes(simulator, &evidence)).map(Note::from));
+    }
     notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
     // Note oscillations of parameters only if little gap is left, because the residual of an effect
     // of another form may look like one.

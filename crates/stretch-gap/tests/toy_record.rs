@@ -194,7 +194,8 @@ fn a_wrong_number_of_the_rig_file_is_told() {
         // Known to a part in a thousand; three per cent are left to its own tolerance.
         approx::assert_relative_eq!(wrong.found.expect("a value"), 0.3, max_relative = 0.03);
         assert!(
-            told.sentence.starts_with("The rig file does not fit the rig: lag.tau is 0."),
+            told.sentence
+                .starts_with("A parameter of the simulator does not fit the rig: lag.tau is 0."),
             "{}",
             told.sentence
         );

@@ -76,3 +76,21 @@ fn other_starts_cost_nothing_without_a_gap_and_little_with_one() {
     let [one, several] = of(&lacking);
     assert!(several > one && several < 1.15 * one, "{one} {several}");
 }
+
+/// The rig is elsewhere than the simulator when each trial begins, and returns within half a second.
+#[test]
+fn a_gap_at_the_beginnings_of_trials_is_noted() {
+    let mut record = Toy::of(&[Law::Lag]).may_lack(&Effect::ALL).measured(1);
+    let noted = |record: &Measured| {
+        let notes = texts(&record.diagnosed().0.notes);
+        notes.iter().any(|note| note.contains("% of the gap in y0 is in the first tenth"))
+    };
+    assert!(!noted(&record));
+    for (i, y) in record.outputs[0].iter_mut().enumerate() {
+        *y += 0.5 * (-0.01 * (i % 1000) as f64 / 0.15).exp();
+    }
+    assert!(noted(&record));
+    let quadratic =
+        Toy::of(&[Law::Lag]).may_lack(&Effect::ALL).hiding(&[(Effect::Quadratic, &[0.1])]);
+    assert!(!noted(&quadratic.measured(2)));
+}

@@ -252,7 +252,7 @@ fn answers() -> Vec<(&'static str, Diagnosis)> {
     });
     let rig_file = json!({
         "what": "parameter", "parameter": "gain", "unit": "1", "says": 2.0, "found": 4.0,
-        "sentence": "gain is 4, the rig file says 2", "hint": "correct the rig file, or what is set on the rig",
+        "sentence": "gain is 4 on the rig, and 2 in the simulator", "hint": "correct the parameter of the simulator, or the setting of the rig",
     });
     let with_best = |name, closed| Diagnosis {
         candidates: from_value(json!([candidate(&[PLAY], 0.2, closed, json!([]))])).expect("one"),

@@ -112,13 +112,13 @@ impl Course {
             }
             Self::Jumps { per_s, size } => {
                 format!(
-                    "it jumps at random, about {} times a second, by {}",
+                    "it jumps, about {} times a second, by {}",
                     three_digits(per_s),
                     sized(size)
                 )
             }
             Self::Drifts { size, correlation_s } => format!(
-                "it drifts at random by {}, with a correlation time of {} s",
+                "it varies by {}, with a correlation time of {} s",
                 sized(size),
                 three_digits(correlation_s)
             ),

@@ -229,12 +229,12 @@ pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
         (true, _) => {
             let course = proposed.course.map(|c| format!(": {} in {channel}", c.words(unit)));
             format!(
-                "What is left in {stage} is random or periodic in time, and nothing that was recorded explains it{}.",
+                "No term that was tried explains what is left in {stage}{}. The cause may act inside the simulator's equations (friction, a limit of the speed), or not depend on what was recorded.",
                 course.unwrap_or_default()
             )
         }
         (false, true) => format!(
-            "What is left in {stage} follows what was recorded, but no short sum of terms says how."
+            "What is left in {stage} depends on the recorded signals, but no short sum of terms describes how."
         ),
         (false, false) => format!(
             "What is missing in {stage} may be {equation}: it closes {:.0} % of what is left there on trials that were not fitted.",

@@ -66,7 +66,7 @@ impl Fault {
                     kind: Kind::Parameter(p),
                     column: None,
                     touches: (0..stages.len()).filter(acts).collect(),
-                    name: format!("{} in the rig file", spec.name),
+                    name: format!("{} of the simulator", spec.name),
                     unit: "1".into(),
                     range: FACTORS,
                     base: 1.0,

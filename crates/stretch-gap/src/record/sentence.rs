@@ -111,12 +111,12 @@ impl Gross {
                 found: Some(value),
                 unit: spec.unit.clone(),
                 sentence: format!(
-                    "{} is {}{unit}, the rig file says {}",
+                    "{} is {}{unit} on the rig, and {} in the simulator",
                     spec.name,
                     short(value),
                     short(spec.nominal)
                 ),
-                hint: "correct the rig file, or what is set on the rig".into(),
+                hint: "correct the parameter of the simulator, or the setting of the rig".into(),
                 ..Self::of(GrossKind::Parameter)
             });
         }
@@ -195,7 +195,7 @@ pub(crate) fn sentence(gross: &[Gross]) -> String {
         (false, false) => format!(" (or {}: these data cannot tell)", rest.join(", or ")),
     };
     let wrong = match first.what {
-        GrossKind::Parameter => "The rig file does not fit the rig",
+        GrossKind::Parameter => "A parameter of the simulator does not fit the rig",
         GrossKind::Factor => "Simulator and record differ by a factor",
         _ => "The record is wrong",
     };

@@ -57,7 +57,7 @@ pub enum Answer {
         /// Effects that were found but are too small to matter.
         small: Vec<String>,
     },
-    /// Effects are missing. With them, only noise is left.
+    /// Effects are missing. With them, little of the gap is left.
     Missing {
         /// The effects, the strongest first.
         effects: Vec<MissingEffect>,
@@ -70,7 +70,7 @@ pub enum Answer {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         ended: Vec<(String, f64)>,
     },
-    /// Effects are missing. With them, more than noise is left.
+    /// Effects are missing. With them, a part of the gap is left.
     Partly {
         /// The effects, the strongest first.
         effects: Vec<MissingEffect>,
@@ -88,7 +88,7 @@ pub enum Answer {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         ended: Vec<(String, f64)>,
     },
-    /// A column of the recording or a number in the rig file is wrong.
+    /// A column of the recording or a parameter of the simulator is wrong.
     WrongRecord {
         /// The errors: the most probable one and those that the data cannot distinguish from it, or
         /// all errors that the columns alone show.
@@ -256,13 +256,16 @@ impl Answer {
             }
             (VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown, _) => {
                 let best = evidence.best_effect.map(|e| simulator.effects()[e].name.clone());
-                let parts = shares.iter().filter(|s| s.closes >= LEAST_PART);
+                // Shares of a set that closes nothing describe only how its effects compensate for
+                // each other.
+                let together = shares.iter().map(|s| s.closes).sum();
+                let parts = shares.iter().filter(|s| s.closes >= LEAST_PART && together > 0.0);
                 Self::Unknown {
                     stage: worst(simulator, evidence, |s| s.excess_after),
                     left: multiple(gap.retuned),
                     best: best.map(|best| (best, multiple(gap.left))),
                     parts: parts.cloned().collect(),
-                    together: shares.iter().map(|s| s.closes).sum(),
+                    together,
                 }
             }
             _ if gap.retuned > null_band => Self::Faint {

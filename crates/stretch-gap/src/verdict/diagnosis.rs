@@ -29,7 +29,7 @@ pub enum VerdictKind {
     NoGap,
     /// Simulation and measurement agree after parameters are re-tuned within their tolerances.
     Parameters,
-    /// A column of the recording or a number in the rig file is wrong; the error is reported.
+    /// A column of the recording or a parameter of the simulator is wrong; the error is reported.
     Record,
     /// Effects of the catalogue are missing and are named.
     Effect,

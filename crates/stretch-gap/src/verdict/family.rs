@@ -21,8 +21,7 @@ pub struct EffectFamily {
     pub property: Family,
     /// The output that is late, or the side of the stage at which a loop acts.
     pub place: String,
-    /// Range of the property, from the least to the greatest value of any effect, with 95 %
-    /// intervals.
+    /// Range of the property, from the least to the greatest value of any effect.
     pub range: [f64; 2],
     /// Unit of the range.
     pub unit: String,
@@ -50,7 +49,8 @@ impl EffectFamily {
         let others = alternatives.iter().filter_map(|name| spec(name)).filter(is_alike);
         let all: Vec<&EffectSpec> = std::iter::once(own).chain(others).collect();
         let sizes = all.iter().filter_map(|one| size(one, candidates));
-        let range = sizes.reduce(|[a, b], [low, high]| [a.min(low), b.max(high)])?;
+        let range =
+            sizes.map(|x| [x, x]).reduce(|[a, b], [low, high]| [a.min(low), b.max(high)])?;
         let mut titles: Vec<String> = Vec::new();
         for title in all.iter().filter_map(|one| Some(one.kind?.title.to_owned())) {
             if !titles.contains(&title) {
@@ -129,17 +129,10 @@ fn side(effect: &EffectSpec) -> &str {
     effect.name.rsplit_once('.').map_or("", |(side, _)| side)
 }
 
-/// Returns the property's range for an effect, from the most probable candidate with this effect.
-/// The effect's first value is varied by 1.96 standard deviations to either side.
-fn size(effect: &EffectSpec, candidates: &[Candidate]) -> Option<[f64; 2]> {
+/// Returns the property's size for an effect, from the most probable candidate with this effect.
+fn size(effect: &EffectSpec, candidates: &[Candidate]) -> Option<f64> {
     let (_, measure) = effect.kind?.family?;
     let candidate = candidates.iter().find(|c| c.effects.contains(&effect.name))?;
-    let own = || candidate.parameters.iter().filter(|p| p.effect == effect.name);
-    let with = |shift: f64| {
-        let shifts = std::iter::once(shift).chain(std::iter::repeat(0.0));
-        let values: Vec<f64> = own().zip(shifts).map(|(p, k)| p.value + k * p.sd).collect();
-        measure(&values)
-    };
-    let ends = [with(-1.96), with(1.96)];
-    Some([ends[0].min(ends[1]), ends[0].max(ends[1])])
+    let own = candidate.parameters.iter().filter(|p| p.effect == effect.name);
+    Some(measure(&own.map(|p| p.value).collect::<Vec<_>>()))
 }

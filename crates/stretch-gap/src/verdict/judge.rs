@@ -3,7 +3,7 @@
 //! | condition | verdict |
 //! | --- | --- |
 //! | the columns alone show an error, or an error of recording or rig file is more probable than every set of effects | `record` |
-//! | a cause outside the catalogue is the most probable | `unknown` |
+//! | a cause outside the catalogue is the most probable, or the most probable set predicts test trials no better than no effect | `unknown` |
 //! | effects are the most probable, the gap is relevant, and only noise and model discrepancy are left | `effect` |
 //! | the same, but more is left, or the strongest effect is at an end of its range | `partial` |
 //! | that nothing is missing is the most probable, or the gap is too small to matter; there is a relevant gap as shipped | `parameters` |
@@ -113,13 +113,18 @@ fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
     let (nothing, effects) = (case.posterior.nothing(), case.posterior.effects());
     let Excess { raw, retuned, .. } = case.gap;
     let first = case.posterior.sets.iter().find(|w| !w.hypothesis.effects.is_empty());
+    // A set that predicts trials that were not fitted no better than the simulator without it makes
+    // up for something else.
+    let is_useless = case.candidates.first().is_some_and(|c| c.closed <= 0.0);
     if case.posterior.unknown >= nothing.max(effects) {
         VerdictKind::Unknown
     } else if names([effects, nothing, case.posterior.unknown], retuned, thresholds)
         && let Some(first) = first
     {
         let Standing { left, is_at_bound, .. } = first.standing;
-        if left <= allowed(retuned, left, thresholds) && !is_at_bound {
+        if is_useless {
+            VerdictKind::Unknown
+        } else if left <= allowed(retuned, left, thresholds) && !is_at_bound {
             VerdictKind::Effect
         } else {
             VerdictKind::Partial
@@ -249,6 +254,25 @@ mod tests {
                 Record => panic!("nothing is wrong with the record"),
             }
         }
+    }
+
+    /// A probable set that closes nothing on trials that were not fitted is not named.
+    #[test]
+    fn a_set_that_predicts_no_better_is_not_named() {
+        let useless = [Candidate { closed: -0.1, ..candidate(&["play"], 1.0) }];
+        let posterior = posterior(1.0, 0.0, 0.0, 3.0);
+        let case = Case {
+            gap: Excess { raw: 0.1, retuned: 3.5, left: 3.0 },
+            posterior: &posterior,
+            candidates: &useless,
+            shares: &[],
+            sanity: &SOUND,
+            is_record: false,
+            too_little: None,
+            is_short: false,
+        };
+        let verdict = judge(&case, &Thresholds::frozen());
+        assert_eq!((verdict.kind, verdict.naming()), (Unknown, Naming::default()));
     }
 
     #[test]

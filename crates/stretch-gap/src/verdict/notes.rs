@@ -2,13 +2,17 @@
 //! drift, and effects that would have been named.
 
 use crate::{
-    evidence::{detection_limit::DetectionLimit, gathered::Evidence, sanity::Sanity},
+    evidence::{
+        detection_limit::DetectionLimit,
+        gathered::{Evidence, StageEvidence},
+        sanity::Sanity,
+    },
     fit::{metric::Metric, prepared::PreparedProblem, swing::Swing},
     problem::{
         runs::Runs,
         sample_roles::{Role, SampleRoles},
         simulator::Simulator,
-        spec::{EffectSpec, StageSpec},
+        spec::{EffectSpec, StageSpec, TrialSpec},
     },
     verdict::{answer::Answer, note::Note},
 };
@@ -147,6 +151,57 @@ pub(crate) fn recorder_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
         ))
     };
     stages.filter_map(note).collect()
+}
+
+/// Ratio of residuals on test trials, re-tuned to as shipped, from which re-tuning is noted as harmful.
+const WORSE: f64 = 1.2;
+
+/// Returns a note for each output that the re-tuned parameters predict worse on test trials than
+/// the parameters as shipped.
+pub(crate) fn retuning_notes(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<String> {
+    let times = |excess: f64| (1.0 + excess).max(0.0).sqrt();
+    let note = |(spec, traces): (&StageSpec, &StageEvidence)| {
+        let (shipped, retuned) = (times(traces.excess_raw), times(traces.excess_retuned));
+        (retuned > WORSE * shipped.max(1.0)).then(|| {
+            format!(
+                "the re-tuned parameters predict {} on trials that were not fitted worse than those as shipped ({retuned:.2} against {shipped:.2} \
+                 times the noise): they make up for something else",
+                spec.channel
+            )
+        })
+    };
+    simulator.stages().iter().zip(&evidence.stages).filter_map(note).collect()
+}
+
+/// Part of a trial that counts as its beginning.
+const BEGINNING: f64 = 0.1;
+/// Share of the gap from which its place at the beginnings of the trials is noted.
+const AT_BEGINNING: f64 = 0.5;
+
+/// Returns a note for each output whose gap is at the beginnings of the trials, because the
+/// simulator may start from another state than the rig.
+pub(crate) fn start_notes(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<String> {
+    let trials = TrialSpec::ranges(simulator.trials());
+    let note = |(spec, traces): (&StageSpec, &StageEvidence)| {
+        let excess = |samples: &[f64]| -> f64 {
+            samples.iter().filter(|r| r.is_finite()).map(|r| r * r - 1.0).sum()
+        };
+        let residuals = trials.iter().map(|trial| &traces.residual_retuned[trial.clone()]);
+        let [early, whole] = residuals.fold([0.0, 0.0], |[early, whole], own| {
+            let beginning = (BEGINNING * own.len() as f64) as usize;
+            [early + excess(&own[..beginning]), whole + excess(own)]
+        });
+        let share = early / whole;
+        (whole > 0.0 && share > AT_BEGINNING).then(|| {
+            format!(
+                "{:.0} % of the gap in {} is in the first tenth of the recordings: check that the simulator starts from the state in which \
+                 the rig was at the first sample",
+                100.0 * share.min(1.0),
+                spec.channel
+            )
+        })
+    };
+    simulator.stages().iter().zip(&evidence.stages).filter_map(note).collect()
 }
 
 /// Share of the fitted time span by which test trials must lie outside this span for a note.

@@ -76,7 +76,7 @@ impl Diagnosis {
                 "Add the proposed term to the simulator, then diagnose again."
             }
             Some(Answer::Unknown { .. } | Answer::AtBounds { .. }) => {
-                "Look where most is left, and give the catalogue what happens there."
+                "Look where most is left, and add to the simulator what happens there as an effect of its own."
             }
             Some(Answer::TooLittle { .. }) => "Record more, then diagnose again.",
         }
@@ -186,25 +186,26 @@ impl Answer {
                     + &also_seen(faint)
             }
             Self::Partly { effects, closes, left, rest, faint, ended } => {
-                let much = if *closes >= MOST { "Mostly" } else { "In part" };
+                let much = if *closes >= MOST { "Most" } else { "A part" };
                 let names: Vec<String> = effects.iter().map(with_share).collect();
                 let rest = rest.as_ref().map_or(String::new(), |rest| {
                     let share = match rest.share < LEAST_SHARE_IN_WORDS {
-                        true => "Less than 1 % is".to_owned(),
-                        false => format!("{:.0} % are", 100.0 * rest.share.min(1.0)),
+                        true => "less than 1 %".to_owned(),
+                        false => format!("{:.0} %", 100.0 * rest.share.min(1.0)),
                     };
                     let sits = match rest.sits.is_empty() {
                         true => String::new(),
                         false => format!(", most of it at {}", rest.sits.join("; ")),
                     };
                     format!(
-                        "{share} not explained, {left:.2} times the noise: that sits in {}{sits}.",
+                        " Not explained: {share} in {}{sits}; {left:.2} times the noise is left.",
                         rest.stage
                     )
                 });
                 let names = names.join(", ");
-                format!("{much} {names} of the gap on trials that were not fitted. {rest}")
-                    + &at_ends(ended)
+                format!(
+                    "{much} of the gap on trials that were not fitted is explained by {names}.{rest}"
+                ) + &at_ends(ended)
                     + &also_seen(faint)
             }
             Self::WrongRecord { errors, corrected: None } => {
@@ -220,7 +221,7 @@ impl Answer {
             }
             Self::Unknown { stage, left, best, parts, together } => {
                 let with_best = match best {
-                    None => "no effect closes any of that".to_owned(),
+                    None => "none of the examined effects closes any of that".to_owned(),
                     Some((best, left)) => {
                         format!("{left:.2} times with {best} in it, which closes most")
                     }

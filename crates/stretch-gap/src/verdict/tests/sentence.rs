@@ -291,8 +291,8 @@ fn cases(simulator: &dyn Simulator) -> Vec<(&'static str, Case)> {
             "wrong rig file",
             wrong(vec![gross(
                 "parameter",
-                "bridge_v is 2.5 V, the rig file says 5",
-                "correct the rig file, or what is set on the rig",
+                "bridge_v is 2.5 V on the rig, and 5 in the simulator",
+                "correct the parameter of the simulator, or the setting of the rig",
             )]),
         ),
         (

@@ -95,7 +95,7 @@ fn live_step(c: &mut Criterion) {
         });
     });
     let general = StretchReceptor::<f64>::new(&calibration).expect("valid");
-    group.bench_function("receptor, shape from the record, length and rate", |b| {
+    group.bench_function("receptor, shape from the calibration, length and rate", |b| {
         let mut memory = general.memory();
         b.iter(|| {
             let readings = black_box(&stream).iter();

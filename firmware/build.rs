@@ -1,5 +1,6 @@
-//! Copies `memory.x` to where the linker finds it. With the feature `c`, compiles the headers of
-//! `stretch export` in the folders of `STRETCH_C`.
+//! Copies `memory.x` into the output folder of the build and makes the linker search there. With
+//! the feature `c`, also compiles the C headers that `stretch export` wrote: one `stretch.h` in
+//! each subfolder of the folder that the environment variable `STRETCH_C` names.
 
 use std::{
     env,

@@ -197,7 +197,7 @@ impl Write for Output {
 
 /// Longest line of text, on any terminal, because longer lines are hard to read. Also the width without a terminal.
 const WIDEST: usize = 100;
-/// Least width: a narrower terminal breaks the lines itself.
+/// Smallest width: a narrower terminal breaks the lines itself.
 const NARROWEST: usize = 30;
 
 /// Columns of the terminal: those of `COLUMNS`, otherwise those that the terminal reports. A table may use them all.

@@ -169,7 +169,10 @@ fn a_replay_does_what_every_column_says_or_refuses_it_by_name() {
     let (mut command, _) = replayed("inlet,outlet,excitation_share", &|i| {
         format!("{},{}", fills(i), if i < 400 { "1" } else { "0.7" })
     });
-    fails(&mut command, &["next.csv", "excitation_share", "it holds 0.7, and 1 in the first row"]);
+    fails(
+        &mut command,
+        &["next.csv", "excitation_share", "it contains 0.7, and 1 in the first row"],
+    );
     // An experiment for a gauge alone sets a quantity that this rig does not have.
     let (mut command, _) = replayed("set_angle_deg", &|_| "10".to_owned());
     fails(&mut command, &["next.csv", "set_angle_deg"]);

@@ -120,7 +120,7 @@ struct Make {
 /// Record of the seeds that are spent, in the folder that the program runs in.
 const SPENT: &str = "spent_seeds.csv";
 
-/// Most cases: a case is a megabyte or two, so that these fill a disk.
+/// Largest number of cases: a case is a megabyte or two, so that these fill a disk.
 const MOST_CASES: usize = 100_000;
 
 fn count(text: &str) -> Result<usize, String> {

@@ -62,7 +62,7 @@ impl Fault {
         match self {
             Self::Noise(share) => {
                 for x in channel(&mut out, signal) {
-                    // The sum of twelve uniform numbers is a normal deviate to three digits.
+                    // The sum of twelve uniform numbers minus 6 is nearly normal.
                     let normal: f64 = (0..12).map(|_| random.random::<f64>()).sum::<f64>() - 6.0;
                     *x += share * span * normal;
                 }

@@ -33,7 +33,7 @@ pub enum ServeError {
 
 fn wrong(what: &str) -> ServeError {
     ServeError::Protocol(format!(
-        "the {what} cannot be read; use stretch and this worker of the same release"
+        "the {what} is not as expected; the program stretch and this worker must be of the same release"
     ))
 }
 

@@ -126,7 +126,7 @@ fn a_model_that_fails_is_told_and_takes_nothing_with_it() {
                 Err(SourceError::Gone(why)) => assert!(why.contains(told), "FMI {fmi}: {why}"),
                 other => panic!("FMI {fmi}: {other:?}"),
             }
-            assert!(notes.iter().any(|n| n.contains("was started anew 1 time")), "{notes:?}");
+            assert!(notes.iter().any(|n| n.contains("was restarted (restarts: 1)")), "{notes:?}");
         }
         for (trouble, told) in [
             (

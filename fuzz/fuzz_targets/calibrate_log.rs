@@ -1,4 +1,4 @@
-//! Any small log: `calibrate` refuses, or makes a record that answers its own log with finite numbers.
+//! Any small log: `calibrate` refuses, or makes a calibration that answers its own log with finite numbers.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! Any bytes as a record: no panic; what loads passes its own checks, is stepped, and every reading of it is finite.
+//! Any bytes as a binary calibration file: no panic; what loads passes its own checks, is stepped, and every reading of it is finite.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,4 +1,4 @@
-//! Any record as C: refused, or a header of printable characters, in both arithmetics and under any name.
+//! Any calibration as C: refused, or a header of printable characters, in both arithmetics and under any name.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

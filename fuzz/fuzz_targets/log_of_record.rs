@@ -1,4 +1,4 @@
-//! Any record on any small log, evenly sampled or not: `apply` and `evaluate` refuse or give finite numbers.
+//! Any calibration on any small log, evenly sampled or not: `apply` and `evaluate` refuse or give finite numbers.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

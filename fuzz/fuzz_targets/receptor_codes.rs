@@ -1,4 +1,4 @@
-//! Any record, over any converter, in integers and in `f32`: no overflow, whatever codes come.
+//! Any calibration, over any converter, in integers and in `f32`: no overflow, whatever codes come.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -8,7 +8,7 @@ use stretch_receptor::code::{CodeCalibration, Fixed, FixedCalibration, FixedObse
 
 fuzz_target!(|bytes: &[u8]| {
     let Some((which, bytes)) = bytes.split_first() else { return };
-    // records as they lie in flash, as if their seal had held
+    // calibrations as they lie in flash, as if their seal had held
     match which % 4 {
         0 => {
             if let Ok((fixed, stream)) = postcard::take_from_bytes::<FixedCalibration<11, 2>>(bytes)
@@ -28,7 +28,7 @@ fuzz_target!(|bytes: &[u8]| {
                 code_steps(Ok::<_, ()>(float), stream);
             }
         }
-        // converted from records on a computer
+        // converted from calibrations on a computer
         _ => {
             let Ok((calibration, stream)) = postcard::take_from_bytes::<Calibration>(bytes) else {
                 return;

@@ -1,4 +1,4 @@
-//! Any record that loads, then any stream of voltages: every reading is finite, in both widths.
+//! Any calibration that loads, then any stream of voltages: every reading is finite, in both widths.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -23,7 +23,7 @@ use crate::{
     watched::watched,
 };
 
-/// A calibration record.
+/// A calibration.
 #[pyclass(frozen, module = "stretch_gap")]
 #[derive(Debug)]
 pub(crate) struct CalibrationRecord {
@@ -110,7 +110,7 @@ struct Made<'a> {
     notes: &'a [String],
 }
 
-/// Fits a calibration; the answer is the record, and fits, models and notes as JSON.
+/// Fits a calibration; the answer is the calibration, and fits, models and notes as JSON.
 #[pyfunction]
 pub(crate) fn calibrate(
     py: Python<'_>,
@@ -186,7 +186,7 @@ impl CalibrationRecord {
         self.gauge.write(&path).map_err(said)
     }
 
-    /// The record as the JSON that the program reads.
+    /// The calibration as the JSON that the program reads.
     fn to_json(&self) -> PyResult<String> {
         self.gauge.to_json().map_err(said)
     }
@@ -215,7 +215,7 @@ impl CalibrationRecord {
         self.calibration().spec().sample_rate_hz.hz()
     }
 
-    /// Least and greatest estimate of the recordings that were fitted.
+    /// Smallest and largest estimate of the recordings that were fitted.
     #[getter]
     fn range(&self) -> (f64, f64) {
         let range = &self.calibration().spec().target_range;

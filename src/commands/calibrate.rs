@@ -63,7 +63,7 @@ pub(crate) struct Args {
     /// Report with figures to write
     #[arg(long, value_name = "r.html", conflicts_with_all = SLEEVE)]
     report: Option<PathBuf>,
-    /// Trials on which the report evaluates [default: the fitted ones]
+    /// Trials on which the report evaluates the calibration [default: the fitted ones]
     #[arg(long, value_name = "TRIAL.csv", num_args = 1.., conflicts_with_all = SLEEVE)]
     test: Vec<PathBuf>,
     /// linear, curve, polyIJ, observer, history, diagnosed, or auto [default: poly13]

@@ -22,10 +22,10 @@ use crate::table::table_text;
 
 /// List the effects that can be added to the simulated rig
 ///
-/// Prints equation, parameters and plausible ranges, in the order in which several
-/// effects of one stage act. A form is an optional parameter that measured rigs need:
-/// it has no influence unless it is given, and `stretch diagnose` fits it around its
-/// usual value. Use effects as
+/// Prints the equation, the parameters and their plausible ranges of every effect.
+/// Several effects of one stage act in the order of the list. A parameter marked `form`
+/// is optional. It describes a detail in which real rigs differ, such as the width of a
+/// knee; `stretch diagnose` fits it around its usual value. Use effects as
 ///
 ///   stretch simulate --effect gauge_hysteresis:h=0.2,s=0.012 --out bench
 ///

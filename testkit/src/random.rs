@@ -33,7 +33,7 @@ impl Random {
     }
 
     /// Returns a nearly normal number of mean 0 and standard deviation 1: the sum of twelve uniform
-    /// numbers.
+    /// numbers minus 6.
     pub fn noise(&mut self) -> f64 {
         (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }

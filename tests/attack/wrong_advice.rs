@@ -130,7 +130,7 @@ fn noise_is_neither_a_unit_nor_a_swap() {
     ] {
         let told = said(&changed(&scratch, name, change));
         assert!(!told.contains("swapped") && !told.contains("looks like"), "{name}: {told}");
-        assert!(told.contains("The record is wrong: "), "{name}: {told}");
+        assert!(told.contains("The recording is wrong: "), "{name}: {told}");
     }
     let bar = changed(&scratch, "bar", &column("pressure_kpa", |p, _| p / 100.0));
     assert!(said(&bar).contains("this looks like bar: multiply by 100"));

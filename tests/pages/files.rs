@@ -11,7 +11,7 @@ use crate::support::{Scratch, calibrate, prints, runs, stretch};
 const BEGIN: &str = "\
 # Files
 
-In addition to recordings, the program reads and writes the four kinds of files on this page. The examples are output of the program. An unknown key in a rig file, a problem file or a calibration record is an error, and the message names the key.
+In addition to recordings, the program reads and writes the four kinds of files on this page. The examples are output of the program. An unknown key in a rig file, a problem file or a calibration file is an error, and the message names the key.
 
 ";
 
@@ -39,10 +39,9 @@ A problem file describes a simulator of your own and its recordings. `stretch in
 ";
 
 const RECORD: &str = "
-## A calibration record
+## A calibration file
 
-A calibration record is the content of a calibration file. `stretch calibrate --out cal.json` writes it as JSON; if the file name ends with `.postcard`, it writes the same record in binary form for a board. `stretch export
---calibration cal.json` checks the digest in the file. After a change by hand, the option `--seal` renews the digest.
+`stretch calibrate --out cal.json` writes a calibration file in JSON. If the file name ends with `.postcard`, it writes a binary calibration file for a board. `stretch export --calibration cal.json` checks the digest in the file. After a change by hand, the option `--seal` renews the digest.
 
 | key | what |
 | --- | --- |
@@ -51,7 +50,7 @@ A calibration record is the content of a calibration file. `stretch calibrate --
 | `sample_rate_hz` | rate at which the calibration runs |
 | `target` | quantity that the model estimates: the reference itself (`direct`), or a contraction, with its resting length |
 | `polarity` | whether the signal rises or falls as the target rises |
-| `signal_range`, `target_range` | least and greatest value in the fitted trials; signal and target are divided by these ranges |
+| `signal_range`, `target_range` | smallest and largest value in the fitted trials; signal and target are divided by these ranges |
 | `rate_estimator` | window and degree of the Savitzky-Golay filter that gives the rate |
 | `rate_source` | whether the fit used the rate of the signal or, as published, the rate of the reference |
 | `turns` | levels of the turning points of movements in the fitted trials, and limits for the levels of later movements; absent if there were too few movements |

@@ -23,7 +23,7 @@ pub struct Plan {
     pub out_of_catalogue: usize,
     /// One effect whose entry is removed from the catalogue, every effect in turn.
     pub struck: usize,
-    /// Least and greatest excess aimed at, log-uniform between them.
+    /// Smallest and largest excess aimed at, log-uniform between them.
     pub excess: (f64, f64),
     /// Family that every form is drawn from; `None` is every family in turn.
     pub family: Option<Family>,

@@ -10,7 +10,7 @@ use crate::rate::{Calibration, Rate};
 use crate::truth::{CaseKind, Label, Truth, are_twins};
 use crate::verdict::Verdict;
 
-/// Least excess from which a single effect counts.
+/// Smallest excess from which a single effect counts.
 pub const COUNTED_EXCESS: f64 = 0.1;
 /// A candidate that closes this share of the gap replaces the removed effect.
 pub const STAND_IN: f64 = 0.85;
@@ -42,7 +42,7 @@ pub struct Singles {
     /// Mean number of names in a tie declared, the one named included.
     #[serde(default)]
     pub tie_size: Option<f64>,
-    /// Called an error of the record or the rig file.
+    /// Called an error of the recording or the rig file.
     #[serde(default)]
     pub false_record: Rate,
     /// Stage right.
@@ -141,7 +141,7 @@ pub struct FamilyRow {
     pub one_named: Rate,
     /// One strong effect and three weak ones: the strong one named.
     pub strongest_named: Rate,
-    /// Nulls on which an effect was named, the gap was called unknown, or the record wrong.
+    /// Nulls on which an effect was named, the gap was called unknown, or the recording wrong.
     pub false_alarms: Rate,
     /// Causes outside the catalogue answered `unknown`: they are written in every family.
     pub foreign_caught: Rate,
@@ -181,7 +181,7 @@ pub struct Score {
     pub unanswered: Vec<String>,
     /// Single effects.
     pub singles: Singles,
-    /// Nulls on which an effect was named, the gap was called unknown, or the record wrong.
+    /// Nulls on which an effect was named, the gap was called unknown, or the recording wrong.
     pub false_alarms: Rate,
     /// Nulls on which an effect was named.
     pub false_names: Rate,

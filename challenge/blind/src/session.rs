@@ -121,7 +121,7 @@ pub(crate) struct Trace {
     pub(crate) volts: Vec<f64>,
     /// Share of the nominal excitation.
     pub(crate) excitation: f64,
-    /// Least strain of the sleeve.
+    /// Smallest strain of the sleeve.
     pub(crate) least_strain: f64,
 }
 

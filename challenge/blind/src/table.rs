@@ -93,7 +93,7 @@ impl fmt::Display for Score {
             row(f, "called a part of the gap", &s.partial)?;
         }
         if s.false_record.hits > 0 {
-            row(f, "called an error of the record", &s.false_record)?;
+            row(f, "called an error of the recording", &s.false_record)?;
         }
         row(f, "stage", &s.stage)?;
         row(f, "95 % set covers (sets not empty)", &s.set_covers)?;

@@ -6,7 +6,7 @@ use stretch_sim::{Effect, EffectParameter};
 
 use crate::simulated::{Protocol, Source};
 
-/// Most sessions that are simulated for one excess.
+/// Largest number of sessions that are simulated for one excess.
 const MOST: usize = 12;
 /// The excess may miss its aim by this factor.
 const NEAR: f64 = 1.7;

@@ -29,7 +29,7 @@ pub(crate) struct Injection {
     pub(crate) strengths: [f64; 3],
     /// What the catalogue calls it.
     pub(crate) name: &'static str,
-    /// Other names that a record of two minutes of similar strokes may not distinguish from it.
+    /// Other names that a recording of two minutes of similar strokes may not distinguish from it.
     pub(crate) kin: &'static [&'static str],
     /// Its strength among the parameters of the effect, and the conversion from our strength.
     pub(crate) size: Option<(&'static str, f64)>,

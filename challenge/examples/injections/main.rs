@@ -1,7 +1,7 @@
 //! Compares a diagnosis before and after a known effect was added to a measured record.
 //!
-//! Eight records of a knitted sleeve on a knee, each with an unknown gap; five effects, three
-//! strengths. `book/src/results/injections.md` has the tables and explains how to read them.
+//! Eight recordings of a knitted sleeve on a knee, each with an unknown gap; five effects, three strengths.
+//! `book/src/results/injections.md` has the tables and explains how to read them.
 //!
 //! `cargo run --release -p stretch-challenge --example injections -- ../shared/data/knit_sleeve`
 
@@ -47,7 +47,7 @@ fn record(folder: &Path, session: &str, sensor: &str) -> anyhow::Result<Trial> {
     Ok(Trial { name: whole.name.clone(), time_s: whole.time_s[..samples].to_vec(), channels })
 }
 
-/// The record as it is, or with an effect in its signal, diagnosed.
+/// The recording as it is, or with an effect in its signal, diagnosed.
 fn said(record: &Trial, injected: Option<(&Injection, usize)>) -> anyhow::Result<Said> {
     let mut trial = record.clone();
     if let Some((injection, which)) = injected {
@@ -63,7 +63,7 @@ fn said(record: &Trial, injected: Option<(&Injection, usize)>) -> anyhow::Result
         rig: None,
         catalogue: &Catalogue::default(),
     })?;
-    // One thread each: the answers are the same, and records are shared out.
+    // One thread each: the answers are the same, and recordings are shared out.
     let options = Options { threads: 1, ..Options::default() };
     let (diagnosis, _) = diagnose(&gauge, &options, &|_| (), &|| false)?;
     Ok(Said { diagnosis, noticed: gauge.notes().to_vec() })
@@ -71,7 +71,10 @@ fn said(record: &Trial, injected: Option<(&Injection, usize)>) -> anyhow::Result
 
 fn main() -> anyhow::Result<()> {
     let Some(folder) = std::env::args().nth(1) else {
-        println!("SKIPPED: no folder was given; one with {}.csv holds the records", RECORDS[0].0);
+        println!(
+            "SKIPPED: no folder was given; one with {}.csv holds the recordings",
+            RECORDS[0].0
+        );
         return Ok(());
     };
     let folder = Path::new(&folder);
@@ -83,7 +86,7 @@ fn main() -> anyhow::Result<()> {
         .iter()
         .map(|(session, sensor)| record(folder, session, sensor))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    // Case 0 of a record is the record as it is.
+    // Case 0 of a recording is the recording as it is.
     let cases: Vec<Option<(&Injection, usize)>> = std::iter::once(None)
         .chain(ALL.iter().flat_map(|i| (0..i.strengths.len()).map(move |which| Some((i, which)))))
         .collect();

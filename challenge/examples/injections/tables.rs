@@ -1,4 +1,4 @@
-//! What was said of records, counted.
+//! What was said of recordings, counted.
 
 use std::fmt::Write;
 
@@ -76,7 +76,7 @@ const PLACES: [&str; 5] = ["named", "in a tie", "95 % set", "best set", "largest
 /// The verdicts, as they are counted.
 const VERDICTS: [&str; 5] = ["effect", "partial", "unknown", "record", "none"];
 
-/// The tables, from the diagnoses of the unchanged records and of each injection at each strength.
+/// The tables, from the diagnoses of the unchanged recordings and of each injection at each strength.
 pub(crate) fn tables(untouched: &[Said], injected: &[&[Said]]) -> String {
     let mut text = String::new();
     let rows = || ALL.iter().flat_map(|i| i.strengths.map(|s| (i, s))).zip(injected);
@@ -121,7 +121,7 @@ fn line(text: &mut String, what: &str, cells: &[String]) {
     let _ = writeln!(text, "| {what} | {} |", cells.join(" | "));
 }
 
-/// In how many records one of the names is in each place; before the injection in brackets.
+/// In how many recordings one of the names is in each place; before the injection in brackets.
 fn found(names: &[&str], untouched: &[Said], said: &[Said]) -> [String; 5] {
     let count = |all: &[Said], at: usize| all.iter().filter(|one| one.places(names)[at]).count();
     std::array::from_fn(|at| format!("{} ({})", count(said, at), count(untouched, at)))
@@ -141,9 +141,9 @@ fn verdicts(said: &[Said]) -> [usize; 5] {
     counts
 }
 
-/// By how much the fitted strength grew, and over how many records; by what factor the gap grew; in
-/// how many records the signal is noticed to stay at its top; in how many the largest part changed;
-/// in how many a new name appeared.
+/// By how much the fitted strength grew, and over how many recordings; by what factor the gap grew;
+/// in how many recordings the signal is noticed to stay at its top; in how many the largest part
+/// changed; in how many a new name appeared.
 fn changes(injection: &Injection, untouched: &[Said], said: &[Said]) -> [String; 6] {
     let pairs = || untouched.iter().zip(said);
     let mut grown: Vec<f64> = match injection.size {

@@ -60,7 +60,7 @@ pub struct RangeSpec<T = f64> {
     /// The channel's own zero, such as the reference voltage of a bridge. It is subtracted in
     /// [`Normalisation::Range`].
     pub zero: T,
-    /// Least value seen at calibration.
+    /// Smallest value seen at calibration.
     pub min: T,
     /// Greatest value seen at calibration.
     pub max: T,
@@ -128,7 +128,7 @@ impl<T: Real> Range<T> {
         self.span
     }
 
-    /// Least value seen at calibration.
+    /// Smallest value seen at calibration.
     pub fn min(&self) -> T {
         self.spec.min
     }

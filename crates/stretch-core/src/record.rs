@@ -6,7 +6,7 @@
 //!
 //! A `record` is such a file in memory. Its first field is its schema (format version). Schema 1 had no checksum and
 //! can still be read. The checksum is Castagnoli's CRC (Koopman, DSN 2002). It detects every error of up to three bits
-//! (up to five bits in records below 655 bytes), every burst of up to 32 bits, and all but one in 2^32 of other errors.
+//! (up to five bits in files below 655 bytes), every burst of up to 32 bits, and all but one in 2^32 of other errors.
 //!
 //! The checksum detects damage. It does not protect against deliberate changes.
 
@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::DesignError;
 
-/// The schema of all kinds of records that this release writes.
+/// The schema of all binary calibration files that this release writes.
 pub const SCHEMA: u32 = crate::CALIBRATION_SCHEMA;
 
 /// Without a lookup table: this saves a kilobyte of flash and costs a few thousand instructions at start-up.
@@ -40,7 +40,7 @@ pub fn checksum(bytes: &[u8]) -> u32 {
 /// [`DesignError::TooLarge`] if the buffer is too small.
 pub fn store<'b, T: Serialize>(value: &T, buffer: &'b mut [u8]) -> Result<&'b [u8], DesignError> {
     let most = buffer.len();
-    let full = DesignError::TooLarge { field: "record in bytes", asked: most + 1, most };
+    let full = DesignError::TooLarge { field: "binary file in bytes", asked: most + 1, most };
     let body = postcard::to_slice(value, buffer).map_err(|_| full)?;
     let (length, seal) = (body.len(), checksum(body).to_le_bytes());
     let place = buffer.get_mut(length..length + SEAL).ok_or(full)?;
@@ -52,7 +52,7 @@ pub fn store<'b, T: Serialize>(value: &T, buffer: &'b mut [u8]) -> Result<&'b [u
 ///
 /// # Errors
 /// [`DesignError::Damaged`] if the checksum does not match the bytes, [`DesignError::Schema`] for a newer schema,
-/// [`DesignError::NoRecord`] if the bytes are not exactly one record of a `T`.
+/// [`DesignError::NoRecord`] if the bytes are not exactly one binary calibration of type `T`.
 ///
 /// ```
 /// use stretch_core::{DesignError, record};
@@ -72,7 +72,7 @@ pub fn load<'r, T: Deserialize<'r>>(bytes: &'r [u8]) -> Result<T, DesignError> {
     if rest.is_empty() { Ok(value) } else { Err(DesignError::NoRecord) }
 }
 
-/// Checks the checksum at the end of a record and returns it; `None` for schema 1.
+/// Checks the checksum at the end of a binary calibration and returns it; `None` for schema 1.
 ///
 /// # Errors
 /// Those of [`load`], except that the bytes of the value are not checked.

@@ -278,7 +278,7 @@ pub struct Alone {
 /// [fitted](crate::Effect::fitted) parameters.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Search {
-    /// Least and greatest value of each parameter.
+    /// Smallest and largest value of each parameter.
     pub ranges: Vec<[f64; 2]>,
     /// Points at which the effect is screened.
     pub starts: Vec<Vec<f64>>,

@@ -6,7 +6,7 @@ use core::f64::consts::TAU;
 /// Properties of a measured channel, computed without the test samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Extent {
-    /// Least value.
+    /// Smallest value.
     pub low: f64,
     /// Greatest value.
     pub high: f64,
@@ -21,9 +21,9 @@ pub struct Extent {
     pub session_s: f64,
     /// Quantisation step: the step of which the values are most nearly multiples.
     pub lattice: f64,
-    /// Least and greatest value of the second signal that the effect reads.
+    /// Smallest and largest value of the second signal that the effect reads.
     pub beside: [f64; 2],
-    /// Least and greatest value of the signal that loads a contact.
+    /// Smallest and largest value of the signal that loads a contact.
     pub load: [f64; 2],
 }
 
@@ -86,7 +86,8 @@ impl Extent {
     }
 }
 
-/// Least and greatest number of quantisation steps in a span that are searched, and the number of values that are used.
+/// Smallest and largest number of quantisation steps in a span that are searched, and the number of values that are
+/// used.
 const STEPS: [f64; 2] = [10.0, 400.0];
 const LOOKED: usize = 2000;
 /// Distance of the values from zero, in spans, beyond which the phase is counted from the least value instead of from

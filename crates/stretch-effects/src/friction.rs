@@ -79,7 +79,7 @@ pub(crate) const FRICTION: Kind = Kind {
 pub static COULOMB_FRICTION: Kind = Kind {
     name: "coulomb_friction",
     title: "dry friction",
-    words: "it rubs by direction, whatever the speed",
+    words: "it rubs with a constant force against the motion",
     equation: "y = x + f tanh(v/width)(1 + lopsided sign(v)) behind the stage, x - the same in front of it",
     parameters: |e, unit| {
         vec![
@@ -202,7 +202,7 @@ impl Operator for LoadFriction {
 pub static LOAD_FRICTION: Kind = Kind {
     name: "load_friction",
     title: "friction that grows with the load",
-    words: "it rubs by direction, in proportion to a load",
+    words: "it rubs against the motion, in proportion to a load",
     equation: "y = x + mu |load| tanh(v/width) behind the stage, x - the same in front of it",
     beside: Beside::VelocityAndLoad,
     parameters: |e, unit| {

@@ -59,7 +59,7 @@ pub static HUM: Kind = Kind {
     name: "hum",
     title: "mains hum",
     words: "it picks up the mains",
-    equation: "y = x + a sin(2 pi f t + phase), the phase found in the record second by second",
+    equation: "y = x + a sin(2 pi f t + phase), the phase found in the recording second by second",
     usual: &[Side::Output],
     parameters: |e, unit| {
         vec![EffectParameter::sized("a", unit, 0.0..=0.1 * e.span()), MAINS, PHASE]

@@ -75,7 +75,7 @@ pub struct EffectParameter {
     pub name: Cow<'static, str>,
     /// Unit; `1` if it has none. In the rig's catalogue, quantities in `strain`, `mm` and `V` scale with the stroke.
     pub unit: Cow<'static, str>,
-    /// Least plausible value: the lower end of the search.
+    /// Smallest plausible value: the lower end of the search.
     pub min: f64,
     /// Greatest plausible value: the upper end of the search.
     pub max: f64,

@@ -203,7 +203,7 @@ impl<'a> Surroundings<'a> {
 
     /// The strain as the second signal of effects on the resistance.
     fn strain_beside(&self) -> Quantity {
-        let meaning = "gauge strain e, as the effects on it leave it".into();
+        let meaning = "gauge strain e, with the effects on the strain".into();
         Quantity { name: "e", meaning, ..self.strain() }
     }
 
@@ -226,8 +226,11 @@ impl<'a> Surroundings<'a> {
 
     /// The signal on which effects on the reference act.
     fn length(&self) -> Quantity {
-        let rig = ("mm", "true length, before the reference shows it");
-        self.signal(rig, "e as it is, before the reference shows it")
+        let rig = ("mm", "true length, before the reference sensor measures it");
+        self.signal(
+            rig,
+            "true value of (reference - zero)/span, before the reference sensor measures it",
+        )
     }
 }
 

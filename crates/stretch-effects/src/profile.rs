@@ -230,7 +230,11 @@ fn rounded(v: &[f64], signals: &Signals) -> Sketch {
         follows("v[max(i - WHOLE, 0)]", "left", "slow", "2"),
     );
     let sketch = Sketch::of(signals.x.clone().named("v").record(), body)
-        .beside(Quantity::new("i", "1", "which sample is shown, from 0, each once and in turn"))
+        .beside(Quantity::new(
+            "i",
+            "1",
+            "index of the sample to return: 0, 1, 2, ... in this order",
+        ))
         .cells(["at", "left", "earlier", "mean"], unit.clone(), "0")
         .cells(["speed", "slow"], format!("{unit}/s"), "0");
     limits(sketch, v, signals).with_all(&[("WHOLE", whole, "1"), ("SHARE", samples - whole, "1")])

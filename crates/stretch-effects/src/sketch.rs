@@ -28,10 +28,10 @@ impl Quantity {
     pub const SESSION_TIME: Self = Self::new("t", "s", "time since the session began");
 
     /// The signal that loads a contact.
-    pub const LOAD: Self = Self::new("load", "1", "what loads the contact");
+    pub const LOAD: Self = Self::new("load", "1", "the signal that loads the contact");
 
     /// The number of samples of a recording.
-    pub const COUNT: Self = Self::new("n", "1", "how many samples it has");
+    pub const COUNT: Self = Self::new("n", "1", "number of samples of the recording");
 
     /// Returns the same quantity under another name.
     pub fn named(self, name: &'static str) -> Self {
@@ -45,7 +45,7 @@ impl Quantity {
 
     /// Returns the output that replaces this input.
     fn behind(&self) -> Self {
-        let meaning = Cow::Borrowed("what goes on in its place");
+        let meaning = Cow::Borrowed("the signal with the effect; use it in place of the input");
         Self { name: "y", unit: self.unit.clone(), meaning, is_record: false }
     }
 }

@@ -214,7 +214,7 @@ pub(crate) fn read_at(late: &str, signals: &Signals) -> Sketch {
     );
     Sketch::of(signals.x.clone().named("v").record(), body)
         .beside(Quantity::COUNT)
-        .beside(Quantity::new("i", "1", "which sample is shown, from 0"))
+        .beside(Quantity::new("i", "1", "index of the sample to return, from 0"))
 }
 
 /// Time offset between the bridge and the length.

@@ -334,7 +334,7 @@ fn frame(source: &Source<'_>, options: &Options) -> String {
         .word(
             "SEAL",
             format!("0x{:08x}u", source.seal),
-            "of the calibration in this form; stretch export --calibration prints it for a calibration file and for a record of integers",
+            "of the calibration in this form; stretch export --calibration prints it for JSON and binary calibration files",
         )
         .word("UNIT", format!("\"{unit}\""), "of the reference")
         .define("PERIOD_NS", (1e9 * period_s).round() as i64, "from a sample to the next");

@@ -97,7 +97,7 @@ fn live(name: &str, estimator: RateEstimator, log: &[f64]) -> Score {
 fn main() {
     let sample_rate = SampleRate::new(HZ).expect("above zero");
     let mut rng = ChaCha8Rng::seed_from_u64(1);
-    // The sum of twelve uniform numbers is nearly normal, and the same on every machine.
+    // The sum of twelve uniform numbers minus 6 is nearly normal, and the same on every machine.
     let mut noise = || NOISE * ((0..12).map(|_| rng.random::<f64>()).sum::<f64>() - 6.0);
     let log: Vec<f64> = (0..LEG * LEGS).map(|n| truth(n).0 + noise()).collect();
 
@@ -128,7 +128,7 @@ fn main() {
     ];
 
     println!(
-        "A ramp of {SPEED} full scale a second that reverses every {} s, noise {} %, {HZ} Hz",
+        "A ramp of {SPEED} of full scale per second that reverses every {} s, noise {} %, {HZ} Hz",
         LEG as f64 / HZ,
         100.0 * NOISE
     );

@@ -221,7 +221,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
         let factor = ((1i128 << shift) + denominator / 2) / denominator;
         assert!(
             factor < 1 << 30 && shift - Self::SHIFT >= 9,
-            "the output is coarser than a change a sample"
+            "the output is too coarse: one unit of it is a change of the signal of 2^20 or more per sample (PER_SAMPLE)"
         );
         (factor as i64, shift - Self::SHIFT)
     };

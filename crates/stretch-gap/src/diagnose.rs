@@ -290,7 +290,7 @@ fn doubt(
     (doubted, suspect): (&PreparedProblem<'_>, &Suspect<'_>),
 ) -> Result<Option<(Vec<Gross>, Found)>, GapError> {
     let (thresholds, found) = (&task.options.thresholds, &searched.found);
-    (task.progress)("errors of the record");
+    (task.progress)("errors of the recording");
     if searched.problem.is_spent() {
         return Ok(None);
     }

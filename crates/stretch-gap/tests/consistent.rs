@@ -4,7 +4,7 @@ use crate::toys::Measured;
 use std::collections::BTreeSet;
 use stretch_gap::{Diagnosis, Evidence, Options, VerdictKind};
 
-/// The diagnosis of a record, found consistent.
+/// The diagnosis of a recording, found consistent.
 pub(crate) fn told(measured: &Measured) -> Diagnosis {
     evidenced(measured, &Options::default()).0
 }
@@ -113,7 +113,7 @@ fn assert_numbers(told: &Diagnosis) {
     let object = json.as_object_mut().expect("an object");
     optional.iter().for_each(|key| drop(object.remove(*key)));
     object["identifiability"] = serde_json::Value::Null;
-    // errors of the record have as many numbers as they have
+    // errors of the recording have as many numbers as they have
     object["answer"].as_object_mut().expect("an answer").remove("errors");
     let null = object.iter().find(|(key, value)| *key != "identifiability" && holds_null(value));
     assert_eq!(null, None);

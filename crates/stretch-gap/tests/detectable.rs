@@ -73,8 +73,8 @@ fn twins_have_larger_limits_than_one_alone() {
     assert!(beside.is_none_or(|beside| beside > 1.2 * late), "{late} {beside:?}");
 }
 
-/// Ten records each with a third more than the limit, and with half of it, diagnosed as any record is. A limit holds for the motion of its
-/// record, so all records have the same motion and differ in their noise.
+/// Ten recordings each with a third more than the limit, and with half of it, diagnosed as any recording is. A limit
+/// holds for the motion of its recording, so all recordings have the same motion and differ in their noise.
 #[test]
 fn what_is_above_its_limit_is_named_and_what_is_below_is_not() {
     let effects = [Effect::Play, Effect::Quadratic, Effect::Cubic, Effect::Drift];
@@ -92,7 +92,7 @@ fn what_is_above_its_limit_is_named_and_what_is_below_is_not() {
         };
         let (above, at, below) = (named(1.3), named(1.0), named(0.5));
         let found = format!("{own:?}: {above}, {at} and {below} of 10 at 1.3, 1 and 0.5 times it");
-        // The limit of a drift in time is too low: of 40 records with 1.3 times the limit, 28 are named, and with 1.6 times 32.
+        // The limit of a drift in time is too low: of 40 recordings with 1.3 times the limit, 28 are named, and with 1.6 times 32.
         let least = if effect == Effect::Drift { 5 } else { 8 };
         assert!(above >= least && below <= 3, "{found}");
     }

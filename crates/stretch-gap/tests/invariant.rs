@@ -107,7 +107,7 @@ fn the_hour_of_the_session_does_not_matter() {
     }
 }
 
-/// The same record twice, the second with something else in its last trial, the one that is tested on.
+/// The same recording twice, the second with something else in its last trial, the one that is tested on.
 fn with_another_test(seed: u64) -> (Measured, Measured) {
     let plain = two_stages().measured(seed);
     let other = two_stages().measured(seed).rewritten(|x, outputs| {

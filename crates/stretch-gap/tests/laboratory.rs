@@ -67,7 +67,7 @@ fn a_single_name_needs_no_experiment() {
     let (told, evidence) = evidenced(&measured, &Options::default());
     assert_eq!(told.ambiguous, ["cubic"], "{}", told.sentence);
     assert_eq!(next_experiment(&measured, &told, &evidence).expect("simulated"), None);
-    // So does a record without a gap.
+    // So does a recording without a gap.
     let quiet = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]).measured(3);
     let (told, evidence) = evidenced(&quiet, &Options::default());
     assert_eq!(next_experiment(&quiet, &told, &evidence).expect("simulated"), None);

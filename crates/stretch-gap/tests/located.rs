@@ -28,7 +28,7 @@ fn standing_out<'a>(told: &'a Diagnosis, by: &str) -> Vec<&'a str> {
     slices.map(|s| s.slice.as_str()).collect()
 }
 
-/// Axes with significant slices other than `allowed`.
+/// Returns the significant slices, with their axes, that are not on an `allowed` axis.
 fn elsewhere<'a>(told: &'a Diagnosis, allowed: &[&str]) -> Vec<(&'a str, &'a str)> {
     let slices = told.location.slices.iter().filter(|s| s.stands_out);
     let all = slices.map(|s| (s.by.as_str(), s.slice.as_str()));
@@ -91,8 +91,8 @@ fn a_gap_of_one_octave_stands_out_there() {
     assert_eq!(elsewhere(&told, &["frequency"]), []);
 }
 
-/// If nothing is wrong a slice is significant in at most 5 of 100 records (dependent slices make it
-/// fewer): over 60 no more than a binomial count exceeds once in a thousand.
+/// If nothing is wrong a slice is significant in at most 5 of 100 recordings (dependent slices make it fewer): over 60
+/// no more than a binomial count exceeds once in a thousand.
 #[test]
 fn nothing_stands_out_of_noise() {
     let alarms = (0..60)

@@ -9,7 +9,7 @@ fn diagnosed(lack: Lack, seed: u64) -> Diagnosis {
     diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0
 }
 
-/// Of 40 records two lie outside a band of 19 in 20; seven or more with probability 0.003.
+/// Of 40 recordings two lie outside a band of 19 in 20; seven or more with probability 0.003.
 #[test]
 fn noise_stays_within_its_band() {
     let is_outside = |seed: &u64| {

@@ -72,8 +72,8 @@ fn the_share_closed_is_the_analytic_one() {
     assert!((found.closed - truth).abs() < 0.15, "{} for {truth}", found.closed);
 }
 
-/// Twenty blocks of 0.5 s are few: percentiles of 20 hold some 90 %. Of 60 records no fewer are held than a binomial count of 0.1 misses once
-/// in a thousand.
+/// Twenty blocks of 0.5 s are few: percentiles of 20 hold some 90 %. Of 60 recordings no fewer are held than a binomial
+/// count of 0.1 misses once in a thousand.
 #[test]
 fn intervals_of_the_share_hold_it_over_seeds() {
     let missed = (0..60)
@@ -145,9 +145,9 @@ fn what_closes_nothing_stands_below() {
     }
 }
 
-/// A size is reported with an interval that holds it: over 40 records at least as often as a
-/// binomial count of 0.05 misses allows once in a thousand. (A block of fifty samples counts as one
-/// observation, although here all are: intervals are wide, and none may be missed by much.)
+/// A size is reported with an interval that holds it: over 40 recordings at least as often as a binomial count of 0.05
+/// misses allows once in a thousand. (A block of fifty samples counts as one observation, although here all are:
+/// intervals are wide, and none may be missed by much.)
 #[test]
 fn intervals_of_a_size_hold_it_over_seeds() {
     let missed = (0..40)

@@ -44,8 +44,9 @@ fn is_near(found: f64, expected: f64) -> bool {
     (found / expected - 1.0).abs() < testkit::tolerance::PLANTED_TERM
 }
 
-/// A square about the end of the range is one term. Gain and offset of the simulator may take a part of it, at the price of their tolerances.
-/// In one record of ten they take so much that a knee in the middle of the range explains the rest as well.
+/// A square about the end of the range is one term. Gain and offset of the simulator may take a part of it, at the
+/// price of their tolerances. In one recording of ten they take so much that a knee in the middle of the range explains
+/// the rest as well.
 #[test]
 fn a_square_is_proposed_as_a_square() {
     let other = |seed: u64| {
@@ -138,8 +139,8 @@ fn a_product_with_the_rate_is_proposed() {
     assert!(is_near(term.coefficient, expected), "{expected}: {}", proposed.equation);
 }
 
-/// Additional white or slow noise, a few times that of the record: a function of nothing. None of
-/// 12 records gets a term.
+/// Additional white or slow noise, a few times that of the record: a function of nothing. None of 12 recordings gets a
+/// term.
 #[test]
 fn nothing_is_proposed_for_noise() {
     for seed in 0..12 {

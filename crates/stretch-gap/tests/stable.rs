@@ -1,4 +1,4 @@
-//! Stability of names when the record is resampled.
+//! Stability of names when the recording is resampled.
 
 use crate::{
     consistent::told,
@@ -21,7 +21,7 @@ fn what_every_trial_shows_is_firm() {
     assert!(told.stabilities.iter().all(|s| (0.0..=1.0).contains(&s.stability)));
 }
 
-/// The same law under two names: a resampled record cannot tell them apart either, and each has a half.
+/// The same law under two names: a resampled recording cannot tell them apart either, and each has a half.
 #[test]
 fn each_of_two_twins_has_a_half() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Square, Effect::Drift]);

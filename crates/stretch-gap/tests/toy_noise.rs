@@ -1,4 +1,4 @@
-//! The noise of a channel, estimated from its record, and signals that pass for noise.
+//! The noise of a channel, estimated from its recording, and signals that pass for noise.
 
 use stretch_gap::{Noise, RandomGenerator, VerdictKind, WINDOW, noise_variance};
 
@@ -132,8 +132,7 @@ fn windows_tell_slow_noise_that_differences_miss() {
     approx::assert_relative_eq!(power.sqrt(), found.sd(), max_relative = 0.08);
 }
 
-/// A diagnosis that estimates its noise from the record finds the same missing effects as one with
-/// stated noise.
+/// A diagnosis that estimates its noise from the recording finds the same missing effects as one with stated noise.
 #[test]
 fn noise_from_the_record_names_what_stated_noise_names() {
     for law in [Law::Line, Law::Lag, Law::Oscillator] {
@@ -220,7 +219,7 @@ fn gross_errors_hide_no_effect() {
     }
 }
 
-/// Of a noise that is stated so large that no record could be so quiet nothing is taken for agreement.
+/// Of a noise that is stated so large that no recording could be so quiet nothing is taken for agreement.
 #[test]
 fn noise_that_no_record_has_is_told() {
     let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);

@@ -101,7 +101,7 @@ fn offsets_by_trial_are_no_effect_where_they_are_described() {
     }
 }
 
-/// A record whose output drifts by so many times its noise.
+/// A recording whose output drifts by so many times its noise.
 fn wandering(times: f64, correlation_s: f64, seed: u64, hidden: &[(Effect, &[f64])]) -> Measured {
     let recorder_drift = Some(SlowDrift { sd: 0.3, correlation_s: 2.0 });
     let toy = Toy { recorder_drift, ..Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(hidden) };
@@ -111,7 +111,7 @@ fn wandering(times: f64, correlation_s: f64, seed: u64, hidden: &[(Effect, &[f64
     })
 }
 
-/// Of 20 records with slow noise as recorders have it, none has a gap; what the noise is taken for is said.
+/// Of 20 recordings with slow noise as recorders have it, none has a gap; what the noise is taken for is said.
 #[test]
 fn slow_noise_of_a_recorder_is_no_gap() {
     for (times, correlation_s) in [(0.0, 1.0), (0.4, 1.0), (0.7, 3.0), (0.5, 8.0)] {

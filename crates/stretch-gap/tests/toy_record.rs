@@ -1,4 +1,4 @@
-//! Errors of the record, each reported as what it is, and none if there is none.
+//! Errors of the recording, each reported as what it is, and none if there is none.
 
 use stretch_gap::{Diagnosis, Distortion, Gross, GrossKind, RandomGenerator, VerdictKind};
 
@@ -17,7 +17,7 @@ fn told(record: &Measured) -> Diagnosis {
     record.diagnosed().0
 }
 
-/// The record with a column as a recorder wrote it.
+/// The recording with a column as a recorder wrote it.
 fn distorted(record: Measured, column: &str, error: Distortion) -> Measured {
     let (ranges, dt_s) = (record.toy.ranges(), record.toy.dt_s);
     record.rewritten(|x, outputs| {
@@ -130,7 +130,7 @@ fn a_copied_column_is_told_with_its_factor() {
 
 #[test]
 fn a_dead_column_is_told_with_where() {
-    // In this record the input covers more than 80 % of its range while y1 is dead. Otherwise a loose sleeve could hide the motion.
+    // In this recording the input covers more than 80 % of its range while y1 is dead. Otherwise a loose sleeve could hide the motion.
     let mut record = chain().measured(1);
     let mut random = RandomGenerator::new(3, 0);
     // The second trial, from 10 s of the session's samples on.
@@ -215,7 +215,7 @@ fn a_factor_beyond_sensors_is_told_of_the_simulator() {
         approx::assert_relative_eq!(gross.factor.expect("a factor"), factor, max_relative = 0.1);
         assert!(
             told.sentence
-                .starts_with("Simulator and record differ by a factor: the simulator's y0 is ")
+                .starts_with("Simulator and recording differ by a factor: the simulator's y0 is ")
         );
         assert_eq!(gross.units, None, "`u` is no unit that is known");
     }

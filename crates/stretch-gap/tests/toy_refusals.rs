@@ -192,7 +192,7 @@ fn progress_is_told_in_the_order_of_the_flow() {
         "fitting",
         "nuisances",
         "rivals",
-        "errors of the record",
+        "errors of the recording",
         "test trials",
     ]
     .map(at);

@@ -136,8 +136,8 @@ fn a_parameter_at_the_end_of_its_tolerances_is_told() {
     );
 }
 
-/// Stages that share a parameter are fitted together: both records determine the gain of two lags,
-/// and it is known better than from one.
+/// Stages that share a parameter are fitted together: both recordings determine the gain of two lags, and it is known
+/// better than from one.
 #[test]
 fn a_shared_parameter_is_known_from_both_stages() {
     let alone = Toy::of(&[Law::Lag]).off_by(&[1.0, 0.0]);

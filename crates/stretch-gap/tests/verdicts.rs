@@ -99,8 +99,8 @@ fn another_rigs_record_is_the_wrong_one() {
     assert!(told.named.is_empty());
 }
 
-/// Parameters of a different rig, eight tolerances off: they are at their bounds, more than noise
-/// is left, and no effect of the catalogue is blamed.
+/// The true parameters differ from the nominal ones by eight tolerances: the re-tuned ones are at their bounds, more
+/// than noise is left, and no effect of the catalogue is blamed.
 #[test]
 fn parameters_at_their_ends_are_told() {
     let toy = Toy::of(&[Law::Oscillator]).off_by(&[0.0, 8.0, 8.0]);
@@ -165,8 +165,8 @@ fn strangers_get_no_name() {
     }
 }
 
-/// Of 40 records in which nothing is missing, its parameters anywhere within two tolerances, none gets a name: a threshold of twelve nats lets
-/// chance through in less than one of 1e5.
+/// Of 40 recordings in which nothing is missing, its parameters anywhere within two tolerances, none gets a name: a
+/// threshold of twelve nats lets chance through in less than one of 1e5.
 #[test]
 fn nothing_is_named_on_noise() {
     for seed in 0..40 {
@@ -181,8 +181,8 @@ fn nothing_is_named_on_noise() {
     }
 }
 
-/// What noise leaves lies within the band of 19 in 20: over 40 records of two stages no more outside than a binomial count of 0.05 exceeds once in a
-/// thousand.
+/// What noise leaves lies within the band of 19 in 20: over 40 recordings of two stages no more outside than a binomial
+/// count of 0.05 exceeds once in a thousand.
 #[test]
 fn noise_alone_stays_within_the_null_band() {
     let toy = Toy::of(&[Law::Lag, Law::Line]);
@@ -197,7 +197,7 @@ fn noise_alone_stays_within_the_null_band() {
     assert!(outside <= binomial_bound(40, 0.05, 0.001), "{outside} of 40");
 }
 
-/// A longer record knows its noise better: the band falls with the root of its samples, and does not depend on units.
+/// A longer recording knows its noise better: the band falls with the root of its samples, and does not depend on units.
 #[test]
 fn the_null_band_narrows_with_the_record() {
     let band = |times: usize, units: [f64; 2]| {

@@ -35,7 +35,7 @@ static RIPPLE: Kind = Kind {
     ..Kind::PLAIN
 };
 
-/// The same kind as an effect in the record of the rig.
+/// The same kind as an effect in the recording of the rig.
 static CHARGER: Effect = Effect {
     name: "charger_ripple",
     words: "a charger swings the bridge",

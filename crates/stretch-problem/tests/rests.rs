@@ -49,7 +49,7 @@ fn noise_that_is_not_told_is_that_of_the_rests() {
         let problem = problem.expect("a problem");
         let noise = problem.description().stages[0].noise.clone().expect("from the rests");
         assert!((noise.sd() / NOISE - 1.0).abs() < 0.2, "{damping}: {noise:?}");
-        assert!(noise.source().starts_with("rests of the record: "), "{noise:?}");
+        assert!(noise.source().starts_with("rests of the recording: "), "{noise:?}");
     }
 }
 
@@ -71,5 +71,5 @@ fn a_first_problem_says_the_noise_and_what_from() {
     let told: f64 =
         line["noise = ".len()..].split_whitespace().next().expect("a number").parse().expect("it");
     assert!((told / NOISE - 1.0).abs() < 0.2, "{line}");
-    assert!(line.contains("measured: rests of the record: "), "{line}");
+    assert!(line.contains("measured: rests of the recording: "), "{line}");
 }

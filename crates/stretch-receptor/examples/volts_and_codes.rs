@@ -1,6 +1,6 @@
 //! Runs the same observer in two forms: from volts in `f32`, and from converter codes in integers, as on a board
-//! without a floating-point unit. The integer form is stored as a record and loaded again, as from an EEPROM. A
-//! sinusoidal voltage drives both forms.
+//! without a floating-point unit. The integer form is stored as a binary calibration file and loaded again, as from an
+//! EEPROM. A sinusoidal voltage drives both forms.
 //!
 //! ```text
 //! cargo run --release -p stretch-receptor --example volts_and_codes
@@ -22,7 +22,7 @@ fn main() -> Result<(), ReceptorError> {
     let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: FULL_SCALE_V })?;
     let mut eeprom = [0xff_u8; 1024];
     let bytes = record::store(&FixedObserver::new(&calibration, &adc)?, &mut eeprom)?.len();
-    println!("The record of integers has {bytes} bytes.");
+    println!("The binary calibration file of integers has {bytes} bytes.");
     let loaded: FixedObserver = record::load(&eeprom[..bytes])?;
     let mut from_codes = Runner::new(loaded);
 

@@ -13,9 +13,9 @@ use crate::{
     front::{Live, over_volts, usable},
 };
 
-/// Least length of a secant, as a share of the distance between knots.
+/// Smallest length of a secant, as a share of the distance between knots.
 pub const LEAST_RUN: f64 = 0.01;
-/// Least slope of the drive over the target. With a smaller slope, the signal would not determine the target.
+/// Smallest slope of the drive over the target. With a smaller slope, the signal would not determine the target.
 pub const LEAST_ANSWER: f64 = 0.05;
 /// Weight s of a new sample in the smoothed signal, which keeps the share s/(2 - s) of the noise's variance.
 pub const SMOOTH: f64 = 0.33;

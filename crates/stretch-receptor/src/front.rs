@@ -5,7 +5,8 @@ use stretch_filter::LARGEST_SAMPLE;
 
 use crate::Withheld;
 
-/// Most missing samples in a row that are bridged by prediction; a further missing sample starts the warm-up again.
+/// Largest number of missing samples in a row that are bridged by prediction; a further missing sample starts the
+/// warm-up again.
 pub const MAX_BRIDGED: u8 = 3;
 
 /// A model behind a [`Front`].

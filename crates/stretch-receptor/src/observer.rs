@@ -13,7 +13,7 @@ use crate::{
     gains::{Gains, SLOPES, STATES},
 };
 
-/// Least length of a secant, as a share of the distance between knots.
+/// Smallest length of a secant, as a share of the distance between knots.
 const LEAST_RUN: f64 = 0.01;
 
 /// A receptor for [`Model::Observer`]: predicts the motion, compares the predicted with the measured signal, and

@@ -30,10 +30,11 @@ fn both(
     codes.iter().map(step).collect()
 }
 
-/// If a slope lies between two gains, rounding may choose the neighbouring gain. The estimates then differ for a moment
-/// and converge again. If a gauge remembers for seconds, the difference lasts as long: for one random calibration in
-/// some thousands, more than a tenth of the answers differ. Of the 256 calibrations in this test at most two do so, the
-/// same ones on every machine.
+/// The observers have one row of gains for each range of the slope. If a slope is close to the limit of two ranges, the
+/// integers may select another row than the floats, because they are rounded. The two estimates then differ until the
+/// memory of the gauge (the slow part of its response) has decayed. If this takes seconds, more than a tenth of the
+/// estimates may differ, which happens with one random calibration in some thousands. The calibrations of this test are
+/// the same on every machine; at most two of the 256 are affected.
 #[test]
 fn integers_answer_as_floats_do() {
     let mut runner = TestRunner::deterministic();

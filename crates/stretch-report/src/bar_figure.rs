@@ -57,7 +57,7 @@ pub enum Scale {
     NoiseMultiples,
 }
 
-/// Most letters of a label on one line of a phone.
+/// Largest number of letters of a label on one line of a phone.
 const LETTERS: usize = 48;
 /// Height of each further line of a label, in pixels.
 const LINE: f64 = 17.0;

@@ -23,7 +23,7 @@ use super::{
     surface_figure::{slice_figure, surface_figure},
 };
 
-/// Most trials whose curves are drawn; the tables hold all trials.
+/// Largest number of trials whose curves are drawn; the tables hold all trials.
 const DRAWN: usize = 4;
 
 /// Names and sentences of a report, in addition to its numbers.

@@ -25,7 +25,7 @@ use super::{
     turn_figure::turn_figure,
 };
 
-/// Most candidates that are drawn.
+/// Largest number of candidates that are drawn.
 const DRAWN: usize = 6;
 
 /// The report as one HTML file.
@@ -87,7 +87,7 @@ fn agreeing(page: &mut Page, subject: &Subject<'_>) {
     let Some(by_trial) = subject.by_trial else { return };
     page.section(
         "Do the runs agree?",
-        "Every run fitted by itself, with the named effects in place. What differs by more than the intervals is another rig, another load, or an effect that was not named.",
+        "Every run is fitted by itself, with the named effects. If a value differs between runs by more than its intervals, the rig or the load was another one, or an effect is missing.",
     );
     page.list(&by_trial.sentences());
     page.table(&difference_table(by_trial));
@@ -336,7 +336,7 @@ fn implemented(page: &mut Page, subject: &Subject<'_>) {
     page.section(
         "To implement",
         "Each named effect with its fitted numbers (and their 95 % intervals), its initial state, and its code: a function that \
-         takes a sample and hands back the next one.",
+         takes a sample and returns it with the effect.",
     );
     for one in subject.implementations {
         let words = effect_in_words(&one.name, subject.diagnosis);

@@ -85,7 +85,7 @@ pub fn candidate_numbers_table(candidates: &[Candidate], stabilities: &[EffectSt
         })
     });
     Table::new(
-        "Numbers of every set, \u{b1} one standard deviation; stability, the share of resampled records in which the most probable set \
+        "Numbers of every set, \u{b1} one standard deviation; stability, the share of resampled recordings in which the most probable set \
          holds the effect",
         &["Effect", "Set", "Stability", "Numbers"],
         rows,

@@ -40,7 +40,7 @@ pub(crate) struct Shared<'a> {
     pub(crate) names: [&'a str; 3],
     /// Largest magnitude of a value on a panel; values beyond have no dot.
     pub(crate) most: f64,
-    /// Most dots of a panel.
+    /// Largest number of dots of a panel.
     pub(crate) dots: usize,
     /// Name of the group of figures in which a brush (a drag over the figure) picks samples, and the key by which it
     /// picks.

@@ -11,7 +11,7 @@ use super::{
     thin::{extent, padded, quantile, sorted},
 };
 
-/// Most dots of one method.
+/// Largest number of dots of one method.
 const DOTS: usize = 720;
 
 /// Half the span of the difference that gives the reference's rate, in samples.

@@ -24,7 +24,7 @@ pub(crate) fn estimate_figure(
     match extent(trial.time_s.iter().copied()) {
         Some(time) if time.end > time.start => window_figure(evaluation, trial, names, &time)
             .live(live(evaluation, trial, names, liveliest(trial).unwrap_or(time), true)),
-        _ => Figure::missing("There is no stretch of time to draw."),
+        _ => Figure::missing("The trial is too short to draw."),
     }
 }
 

@@ -110,14 +110,21 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
             format!("Probability {} {GIVEN}: {rest}.", percent(p))
         }
         (VerdictKind::Record, Some(c)) if !d.gross.iter().any(Gross::is_plain) => {
-            format!("Probability {} compared with every set of effects, {GIVEN}.", percent(c.probability))
+            format!(
+                "Probability {} compared with every set of effects, {GIVEN}.",
+                percent(c.probability)
+            )
         }
-        (VerdictKind::Record, _) => "The columns alone show this, whatever the simulator is.".to_owned(),
+        (VerdictKind::Record, _) => {
+            "The columns alone show this, whatever the simulator is.".to_owned()
+        }
         (VerdictKind::Unknown, _) => {
-            "That there is a gap is certain; what the catalogue offers explains at best a part of it.".to_owned()
+            "There is certainly a gap; the effects of the catalogue explain at most a part of it."
+                .to_owned()
         }
         _ if d.is_faint() => {
-            "More is left than the stated noise explains, but too little to name a cause.".to_owned()
+            "More is left than the stated noise explains, but too little to name a cause."
+                .to_owned()
         }
         _ => "What is left is within the noise on trials that were not fitted.".to_owned(),
     };

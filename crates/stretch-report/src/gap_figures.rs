@@ -17,7 +17,7 @@ use super::{
 
 /// Length of the window that is drawn, s.
 const WINDOW_S: f64 = 8.0;
-/// Most dots of a panel.
+/// Largest number of dots of a panel.
 const DOTS: usize = 900;
 /// Number of samples on each side of a sample in the difference that gives its rate.
 const REACH: usize = 10;

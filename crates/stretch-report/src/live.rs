@@ -46,7 +46,7 @@ struct Series<'a> {
 pub(crate) struct Pick {
     /// The key that is compared: `level`, `rate` or `time`.
     pub(crate) by: &'static str,
-    /// Least value of the key.
+    /// Smallest value of the key.
     pub(crate) from: f64,
     /// Greatest value of the key.
     pub(crate) to: f64,

@@ -95,7 +95,7 @@ pub(crate) fn step_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
         .live(live.json())
 }
 
-/// The estimate over a triangular signal: the figure of a model without memory is a single line.
+/// Draws the estimate over a triangular signal. For a model without memory this is a single line.
 pub(crate) fn loop_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Figure {
     let calibration = &calibrated.calibration;
     let loops: Vec<Vec<(f64, f64)>> = PERIODS_S

@@ -12,10 +12,10 @@ use super::{
     thin::{extent, padded, quantile, sample, sample_in_order, sorted},
 };
 
-/// Most dots of each direction.
+/// Largest number of dots of each direction.
 const DOTS: usize = 700;
 
-/// Most points of the line of estimates.
+/// Largest number of points of the line of estimates.
 const POINTS: usize = 600;
 
 /// Samples slower than this share of the fastest rate are at rest: they have no direction.

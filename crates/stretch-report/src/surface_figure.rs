@@ -17,7 +17,7 @@ use super::{
 /// Cells along each side of the mesh.
 const CELLS: usize = 18;
 
-/// Most dots.
+/// Largest number of dots.
 const DOTS: usize = 900;
 
 /// The surface in the region that samples support, with dots above and below.
@@ -34,7 +34,7 @@ pub(crate) fn surface_figure(view: &BranchView<'_>, ink: Ink) -> Figure {
         .live(live(view, ink))
 }
 
-/// Most samples that a script shows with their distance to the surface.
+/// Largest number of samples that a script shows with their distance to the surface.
 const STEMS: usize = 400;
 
 /// The surface as JSON: heights over the corners of its cells, and samples, in thousandths of the cube.
@@ -283,7 +283,7 @@ fn round_numbers(low: f64, high: f64) -> Vec<f64> {
 /// Inks of a slow, a middle and a fast rate.
 const INKS: [Ink; 3] = [Ink::Low, Ink::Middle, Ink::High];
 
-/// Most dots of each third.
+/// Largest number of dots of each third.
 const SLICE_DOTS: usize = 350;
 
 /// Target over signal: the samples in motion by thirds of their rate, slow to

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// Least and greatest finite value, or nothing.
+/// Smallest and largest finite value, or nothing.
 pub(crate) fn extent(values: impl IntoIterator<Item = f64>) -> Option<Range<f64>> {
     let ends = values
         .into_iter()

@@ -99,7 +99,8 @@ fn draw(
     curve: &[(f64, f64)],
     [x, y]: [&Range<f64>; 2],
 ) -> Drawn {
-    let labels = [&*labelled(name, shown_unit(&one.unit)), "left, multiples of the noise"];
+    let labels =
+        [&*labelled(name, shown_unit(&one.unit)), "remaining error, multiples of the noise"];
     let axes = Axes::new(x.clone(), y.clone(), labels);
     plot(area, &axes, |chart| {
         let floor = [(x.start, 1.0), (x.end, 1.0)];

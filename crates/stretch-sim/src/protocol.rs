@@ -290,7 +290,7 @@ fn excitation(trial: &Trial) -> Result<f64, SimError> {
         Some(other) => Err(SimError::Column {
             name: EXCITATION.to_owned(),
             problem: format!(
-                "it holds {other}, and {share} in the first row; give one number above 0 and at most 2, the same in every row"
+                "it contains {other}, and {share} in the first row; it must be the same number in every row, above 0 and at most 2"
             ),
         }),
     }

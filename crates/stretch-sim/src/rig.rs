@@ -90,7 +90,7 @@ impl Rig {
     /// "gauge"`).
     pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
         if let Some(kind) = file.kind.as_ref().filter(|kind| *kind != "rig") {
-            let needed = "of a whole rig, without kind";
+            let needed = "of a whole rig, without the key kind";
             return Err(SimError::Kind { found: kind.clone(), needed });
         }
         let mut rig = Self::default();

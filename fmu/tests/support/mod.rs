@@ -205,7 +205,7 @@ pub(crate) fn spec() -> ProblemSpec {
     }
 }
 
-/// The command of a worker that runs an FMU of the servo.
+/// Returns the command that starts `stretch-fmu` as a worker with the servo's FMU `file`; `more` are further arguments.
 pub(crate) fn worker(file: &Path, more: &[&str]) -> WorkersSpec {
     let file = file.to_str().unwrap();
     let mut command = vec![env!("CARGO_BIN_EXE_stretch-fmu"), file, "--variable", "tau=servo.tau"];

@@ -61,11 +61,11 @@ class Estimate:
 
 
 class Calibration:
-    """Calibration record that converts the signal of a sensor to an estimate of its reference.
+    """Calibration that converts the signal of a sensor to an estimate of its reference.
 
     `calibrate` fits a calibration; `Calibration.load` and `Calibration.from_json` read one. A calibration can be applied to
     recordings (`apply`), run live (`receptor`), and written for the program `stretch` and for boards (`save`). Two calibrations
-    are equal if their records are equal.
+    are equal if their calibration files are equal.
 
     Examples
     --------
@@ -97,7 +97,7 @@ class Calibration:
         Returns
         -------
         Calibration
-            The calibration. Its `model`, `models`, `fits` and `notes` are empty, because the record does not contain them.
+            The calibration. Its `model`, `models`, `fits` and `notes` are empty, because the file does not contain them.
 
         Raises
         ------
@@ -118,7 +118,7 @@ class Calibration:
         Returns
         -------
         Calibration
-            The calibration. Its `model`, `models`, `fits` and `notes` are empty, because the record does not contain them.
+            The calibration. Its `model`, `models`, `fits` and `notes` are empty, because the file does not contain them.
 
         Raises
         ------
@@ -146,7 +146,7 @@ class Calibration:
         self._record.save(replaceable(path, ".json", ".postcard"))
 
     def to_json(self) -> str:
-        """Return the record as JSON.
+        """Return the calibration as JSON.
 
         Returns
         -------
@@ -178,7 +178,7 @@ class Calibration:
 
     @property
     def range(self) -> tuple[float, float]:
-        """Least and greatest value of the reference in the fitted recordings, tuple of two floats, in `unit`."""
+        """Smallest and largest value of the reference in the fitted recordings, tuple of two floats, in `unit`."""
         return self._record.range
 
     @property
@@ -455,7 +455,7 @@ def calibrate(
     names : list of str, optional
         Names of the recordings in notes and warnings. By default they are numbered.
     date : str, default ""
-        Date of the calibration, as free text for the record.
+        Date of the calibration, as free text for the calibration file.
 
     Returns
     -------

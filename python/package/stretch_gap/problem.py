@@ -33,7 +33,7 @@ class Parameter:
     unit : str, default ""
         Unit of the value. Empty if it has none.
     least : float, optional
-        Least plausible value. By default the value keeps its sign if its tolerance is relative, or smaller than the value.
+        Smallest plausible value. By default the value keeps its sign if its tolerance is relative, or smaller than the value.
     greatest : float, optional
         Greatest plausible value. By default it is not limited.
     stages : sequence of str, default ()
@@ -62,7 +62,7 @@ class Argument:
     Parameters
     ----------
     min : float
-        Least plausible value, in `unit`.
+        Smallest plausible value, in `unit`.
     max : float
         Greatest plausible value, in `unit`.
     off : float or None, default 0.0

@@ -101,7 +101,7 @@ pub(super) struct PlantSpec {
     pub(super) samples: usize,
     pub(super) input: &'static str,
     pub(super) input_unit: &'static str,
-    /// Least and greatest input.
+    /// Smallest and largest input.
     pub(super) span: (f64, f64),
     pub(super) parameters: &'static [Parameter],
     pub(super) stages: [StageSpec; 2],

@@ -9,7 +9,7 @@ pub(crate) const KNOTS: usize = 25;
 /// Weight of the curve's second differences relative to a sample's residual.
 const BEND: f64 = 1e-3;
 
-/// Least rise of a curve over its whole length, as a share of the signal's range.
+/// Smallest rise of a curve over its whole length, as a share of the signal's range.
 pub(crate) const LEAST_RISE: f64 = 1e-3;
 
 /// Returns the range of the values without the outermost 0.02 % at each end; `None` if the range is empty.

@@ -18,8 +18,8 @@ use super::{
 };
 
 const ITERATIONS: usize = 14;
-/// Least slope by which an error of the signal is divided, as a share of the mean slope. Where the curve is flat, the
-/// signal does not determine the target.
+/// Smallest slope by which an error of the signal is divided, as a share of the mean slope. Where the curve is flat,
+/// the signal does not determine the target.
 const LEAST_SLOPE: f64 = 0.25;
 /// A fit ends if a step lowers the sum of squares by less than this share.
 const ENDED: f64 = 1e-4;

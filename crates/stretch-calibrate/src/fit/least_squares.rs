@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 /// Rows per column that are collected before they are folded. The triangle has one row per column, so it then adds a
 /// quarter to the cost.
 const WAITING: usize = 4;
-/// Least number of rows that are collected before they are folded.
+/// Smallest number of rows that are collected before they are folded.
 const LEAST_WAITING: usize = 64;
 
 /// An accumulator of rows that keeps only their triangular factor.

@@ -19,8 +19,8 @@ use super::{
 };
 
 const RADII: [f64; 3] = [0.03, 0.1, 0.3];
-/// Least slope of the drive with respect to the target while plays (hysteresis elements) stand still, as a share of the
-/// slope without plays.
+/// Smallest slope of the drive with respect to the target while plays (hysteresis elements) stand still, as a share of
+/// the slope without plays.
 const LEAST_ANSWER: f64 = 0.1;
 /// Window of the quadratic filter that smooths the reference, in samples.
 const SMOOTH: usize = 7;

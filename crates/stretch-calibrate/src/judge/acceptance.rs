@@ -74,7 +74,7 @@ pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
     })
 }
 
-/// Least constant error that is reported, in percent of the range of the reference.
+/// Smallest constant error that is reported, in percent of the range of the reference.
 const FAR_OFF_PERCENT: f64 = 5.0;
 
 /// Returns a sentence for estimates whose error is mostly constant: `bias^2` is at least half of `rmse^2`, and the bias

@@ -41,9 +41,10 @@ pub struct LiveReceptor {
     memory: <Receptor<f64> as Design>::Memory,
     cadence: Runner<Cadence>,
     faults: Faults,
-    /// The rate estimator of a model that gives estimates without a rate, and the number of consecutive missing
-    /// samples.
+    /// For a model that needs no rate: a rate estimator whose warm-up decides from which sample on the reading has a
+    /// rate (NaN before).
     rate: Option<Runner<RateFilter<f64>>>,
+    /// Number of consecutive missing samples.
     missing: u8,
 }
 

@@ -12,8 +12,8 @@ const POWERS: std::ops::RangeInclusive<i32> = -9..=9;
 /// Number of powers.
 const COUNT: usize = 19;
 
-/// Least number of equal samples from which a sensor counts as not connected. Fewer may come from a rest and a coarse
-/// converter.
+/// Smallest number of equal samples from which a sensor counts as not connected. Fewer may come from a rest and a
+/// coarse converter.
 const CONSTANT: u64 = 100;
 
 /// Counts of a signal's samples compared with the range of a calibration.
@@ -35,7 +35,7 @@ pub struct Reach {
     range: Range<f64>,
     unit: String,
     samples: u64,
-    /// Least and greatest sample.
+    /// Smallest and largest sample.
     seen: Interval,
     /// For each power of ten, the number of samples that lie inside after multiplication by that power.
     inside: [u64; COUNT],

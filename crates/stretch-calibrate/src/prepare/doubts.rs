@@ -8,20 +8,20 @@ use crate::Options;
 
 use super::{series::extent, trials::Piece};
 
-/// Least squared correlation of signal and reference at which the line of a trial can be compared with another: the
+/// Smallest squared correlation of signal and reference at which the line of a trial can be compared with another: the
 /// line then explains at least half of the variance.
 const HAS_LINE: f64 = 0.5;
 /// Ratios of two trials' slopes that hysteresis, another rate or another range can cause.
 const USUAL_SLOPES: RangeInclusive<f64> = 0.5..=2.0;
 /// Numbers of decimals, or of digits after the first significant one, with which a file may have been saved.
 const DIGITS: RangeInclusive<i32> = 0..=12;
-/// Least number of equal readings in a row at which a signal counts as stuck.
+/// Smallest number of equal readings in a row at which a signal counts as stuck.
 const STANDS: usize = 5;
 /// Share of its range by which the reference must move while the signal is stuck.
 const MOVES_ON: f64 = 0.1;
 /// Rates below this limit, Hz, are probably due to time stamps in milliseconds.
 const SLOW_HZ: f64 = 0.5;
-/// Least number of samples at which a low rate is attributed to a wrong unit of time.
+/// Smallest number of samples at which a low rate is attributed to a wrong unit of time.
 const TELLING: usize = 50;
 
 /// Greatest number of trials with which each trial is compared. If there are more, they are chosen evenly.

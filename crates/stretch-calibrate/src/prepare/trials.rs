@@ -14,7 +14,7 @@ use super::{
     series::{DeadBands, Series, extent, noise, polarity, sample_rate_hz, series},
 };
 
-/// Least number of samples of a part; shorter parts have no rate.
+/// Smallest number of samples of a part; shorter parts have no rate.
 const SHORTEST: usize = 3;
 
 /// Greatest number of rows of all trials together to which a calibration is fitted or on which it is evaluated: about a
@@ -23,7 +23,7 @@ pub const MOST_ROWS: usize = 10_000_000;
 /// The same limit for models with memory, which take 145 (history) to 180 bytes (observer) a row.
 const MOST_REMEMBERED: usize = 3_000_000;
 
-/// Least number of trials for a cross-validation that leaves out whole trials. With fewer trials, parts are left out.
+/// Smallest number of trials for a cross-validation that leaves out whole trials. With fewer trials, parts are left out.
 pub(crate) const LEAST_TRIALS: usize = 3;
 
 /// Greatest number of folds of whole trials. If there are more trials, each fold holds several, because with one fit

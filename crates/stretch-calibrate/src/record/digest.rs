@@ -85,10 +85,10 @@ pub fn join(object: &str) -> Option<String> {
     Some(format!("{open},\n  \"digest\": \"{}\"\n}}\n", digest(object)))
 }
 
-/// Returns a record as indented JSON with the digest as its last field.
+/// Returns a calibration file as indented JSON with the digest as its last field.
 ///
 /// # Errors
-/// [`CalibrateError::Record`] if the record is not an object, or has numbers that are not finite.
+/// [`CalibrateError::Record`] if the calibration file is not an object, or has numbers that are not finite.
 pub fn seal(record: &impl Serialize) -> Result<String, CalibrateError> {
     let problem = |problem| CalibrateError::Record { file: "calibration".to_owned(), problem };
     let object = serde_json::to_string_pretty(record).map_err(|e| problem(e.to_string()))?;

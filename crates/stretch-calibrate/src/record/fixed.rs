@@ -1,4 +1,4 @@
-//! Integer calibrations for a board's converter, as records (sealed bytes) for its flash.
+//! Integer calibrations for a board's converter, as binary calibration files (sealed bytes) for its flash.
 
 use std::{fmt, path::Path};
 
@@ -14,7 +14,7 @@ use stretch_receptor::{
 
 use crate::{CalibrateError, SpellingError};
 
-/// Buffer size for the largest record, an observer in which every number has its greatest length.
+/// Buffer size for the largest file, an observer in which every number has its greatest length.
 const BYTES: usize = 1024;
 
 /// Step of an integer estimate, in the unit of the reference.
@@ -199,7 +199,7 @@ fn made<T: Serialize>(
 ///
 /// let adc = parse_adc("12,0,3.3")?;
 /// let record = fixed_record(&stretch_receptor::example_observer(), &adc)?;
-/// let mut receptor = BoardReceptor::new(&record.bytes).expect("one of those records");
+/// let mut receptor = BoardReceptor::new(&record.bytes).expect("one of those files");
 /// assert_eq!(receptor.adc_bits(), 12);
 /// assert!(receptor.step(AdcCode(1861)).is_ok());
 /// assert!(BoardReceptor::new(b"anything else").is_none());
@@ -212,8 +212,8 @@ pub struct BoardReceptor {
 }
 
 impl BoardReceptor {
-    /// Builds the receptor from the bytes of a record; `None` if the bytes are not such a record, or have a rate
-    /// estimator that [`fixed_record`] does not write.
+    /// Builds the receptor from the bytes of a binary calibration file; `None` if the bytes are not such a file, or
+    /// have a rate estimator that [`fixed_record`] does not write.
     pub fn new(bytes: &[u8]) -> Option<Self> {
         rated_receptor(bytes).or_else(|| {
             let observer: FixedObserver = record::load(bytes).ok()?;
@@ -222,12 +222,12 @@ impl BoardReceptor {
         })
     }
 
-    /// Builds the receptor from a file; `None` if the file cannot be read or contains no such record.
+    /// Builds the receptor from a file; `None` if the file cannot be read or contains no such calibration.
     pub fn read(path: &Path) -> Option<Self> {
         Self::new(&stretch_data::files::read_whole(path).ok()?)
     }
 
-    /// Returns the number of bits of the converter for which the record was made.
+    /// Returns the number of bits of the converter for which the calibration was made.
     pub fn adc_bits(&self) -> u8 {
         self.adc_bits
     }

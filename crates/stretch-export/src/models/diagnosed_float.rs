@@ -76,7 +76,7 @@ fn filter(constants: &mut Constants, model: &Diagnosed<f32>) {
         .define("BEGIN_RR", span * span, "variance of the first rate")
         .define("LOW", model.low, "smallest target")
         .define("HIGH", model.high, "largest target")
-        .define("DEAD_BAND", model.dead_band, "rates up to this one keep the branch")
+        .define("DEAD_BAND", model.dead_band, "the branch changes only at a rate above this one")
         .define("ZERO", model.zero, "reference at a target of 0")
         .define("GAIN", model.gain, "reference per target")
         .define("SPREAD", model.spread, "reference per standard deviation");
@@ -124,8 +124,8 @@ fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Def
     if let Some(worn) = defects.worn {
         has.extend(["remembers", "worn"]);
         constants
-            .define("WORN_M", worn.m, "loss of response in the end")
-            .define("WORN_N", worn.n, "distance travelled at half the loss")
+            .define("WORN_M", worn.m, "share of the response that is lost after infinite travel")
+            .define("WORN_N", worn.n, "distance travelled at which half of that share is lost")
             .define("WORN_ZERO", worn.zero, "drive at which nothing is lost")
             .define("WORN_REVERSAL", worn.reversal, "turns smaller than this do not count")
             .define("WORN_TRAVELLED", worn.travelled, "distance travelled before");

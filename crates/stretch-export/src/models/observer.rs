@@ -26,7 +26,11 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
         .define("KNOTS", knots as i32, "knots of the curve from drive to signal")
         .array("int32_t", "curve", &n.curve[..knots])
         .array("int32_t", "recips", &recips[..knots])
-        .define("RECIP_BITS", *recip_bits as i32, "recips: places per signal, times 2^this")
+        .define(
+            "RECIP_BITS",
+            *recip_bits as i32,
+            "recips are positions on the curve per unit of signal, times 2^RECIP_BITS",
+        )
         .array(
             "int32_t",
             "tangents",
@@ -49,7 +53,7 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
         .define("GAIN_HALF", (1i64 << n.gain_bits) >> 1, "")
         .define("LOW", n.low, "smallest target")
         .define("HIGH", n.high, "largest target")
-        .define("DEAD_BAND", n.dead_band, "rates up to this one keep the branch")
+        .define("DEAD_BAND", n.dead_band, "the branch changes only at a rate above this one")
         .define("ZERO", n.zero, "output at a target of 0")
         .define("GAIN", n.gain, "output per target")
         .define("OUTPUT_SHIFT", 26 + i32::from(n.output_bits), "")
@@ -67,7 +71,7 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
     }
 }
 
-/// Least length of a secant of the curve, as a share of the distance between knots. The receptor
+/// Smallest length of a secant of the curve, as a share of the distance between knots. The receptor
 /// uses the same value.
 const LEAST_RUN: f32 = 0.01;
 
@@ -99,7 +103,7 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
         .rows("float", "gains", &o.gains)
         .define("LOW", o.low, "smallest target")
         .define("HIGH", o.high, "largest target")
-        .define("DEAD_BAND", o.dead_band, "target rates up to this one keep the branch")
+        .define("DEAD_BAND", o.dead_band, "the branch changes only at a target rate above this one")
         .define("ZERO", o.zero, "reference at a target of 0")
         .define("GAIN", o.gain, "reference per target")
         .define("FOLLOWS_REST", i32::from(follows), "whether a baseline is followed");

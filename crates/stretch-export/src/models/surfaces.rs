@@ -23,7 +23,11 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
     let mut constants = Constants::default();
     constants
         .define("CODES", 1u32 << adc_bits, "number of codes")
-        .define("ALIGN", 1u32 << (16 - adc_bits), "moves a code to the upper end of 16 bits")
+        .define(
+            "ALIGN",
+            1u32 << (16 - adc_bits),
+            "factor that shifts a code to the upper end of 16 bits",
+        )
         .define("WINDOW", rate.window as i32, "samples")
         .define("DEGREE", rate.degree as i32, "of the polynomial that gives the rate");
     for k in 0..=rate.degree {
@@ -38,7 +42,7 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
         .define("HALF", half, "")
         .define("CHANGE", factor, "from a rate to a change per sample")
         .define("CHANGE_SHIFT", shift as i32, "")
-        .define("DEAD_BAND", *dead_band as u32, "rates up to this one keep the branch")
+        .define("DEAD_BAND", *dead_band as u32, "the branch changes only at a rate above this one")
         .define(
             "MIRROR",
             if *falling { u32::MAX } else { 0 },
@@ -110,7 +114,11 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
         .define("WINDOW", window as i32, "samples")
         .array("float", "taps", filter.taps())
         .define("PERIOD_S", model.period_s(), "from a sample to the next")
-        .define("DEAD_BAND", direction.dead_band, "rates up to this one keep the branch")
+        .define(
+            "DEAD_BAND",
+            direction.dead_band,
+            "the branch changes only at a rate above this one",
+        )
         .word("RISING", rising, "the branch of a rising signal")
         .word("FALLING", falling, "");
     let (name, surface) = match model.map() {

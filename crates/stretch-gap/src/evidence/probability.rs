@@ -69,7 +69,7 @@ pub(crate) struct Function {
 pub(crate) struct Gap {
     /// Excess that the re-tuned simulator leaves.
     pub(crate) retuned: f64,
-    /// Excess below which noise alone stays in 19 of 20 recordings like this one.
+    /// Excess that noise alone does not exceed in 95 % of recordings like this one.
     pub(crate) null_band: f64,
 }
 

@@ -41,8 +41,9 @@ const DRAWS: usize = 200;
 pub struct EffectStability {
     /// Effect.
     pub effect: String,
-    /// Share of 200 resampled records, blocks of 0.5 s drawn with replacement, in which the most probable set holds the effect: stability
-    /// selection of Meinshausen and Buehlmann (2010, doi 10.1111/j.1467-9868.2010.00740.x) over the sets that were fitted.
+    /// Share of 200 resampled recordings, blocks of 0.5 s drawn with replacement, in which the most probable set holds
+    /// the effect: stability selection of Meinshausen and Buehlmann (2010, doi 10.1111/j.1467-9868.2010.00740.x) over
+    /// the sets that were fitted.
     pub stability: f64,
 }
 

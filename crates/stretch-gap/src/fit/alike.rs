@@ -20,11 +20,11 @@
 //! contribution of these effects. With the correction, explaining one error by another does not
 //! count, all other explanations count in full, and the score of a set without such effects does
 //! not change. If the contribution d of the effects is left out, the parameters compensate for it
-//! as far as they can, so the residual is the following. Here A is not the correction above but the
-//! matrix of the sensitivities to the parameters:
+//! as far as they can. The residual is then (J: sensitivities to the parameters, V: covariance of
+//! the noise, b: prior precision of the parameters)
 //!
 //! ```text
-//! r_unread = r + d - A (A'V^-1 A + b I)^-1 A'V^-1 d
+//! r_unread = r + d - J (J'V^-1 J + b I)^-1 J'V^-1 d
 //! ```
 //!
 //! n is the mean, over the outputs that read others, of the effective sample sizes N/m of

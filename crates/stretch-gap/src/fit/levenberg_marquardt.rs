@@ -275,12 +275,12 @@ impl<'a, 'b> Descent<'a, 'b> {
         columns.map(|(&s, v)| Ok(self.compare.metrics[s].column(&self.compare.roles, v?))).collect()
     }
 
-    /// J of the module documentation.
+    /// Returns J of the module documentation.
     fn cost_of(&self, model: &Model, residuals: &[Column]) -> f64 {
         cost(self.compare, (self.stages, &self.coordinates), model, residuals)
     }
 
-    /// Renews the sensitivities that are due, then computes N and g.
+    /// Computes the sensitivities that are out of date again, then N and g of the module documentation.
     fn linearise(
         &mut self,
         known: &[Option<Sensitivities>],

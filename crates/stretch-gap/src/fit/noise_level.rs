@@ -45,12 +45,11 @@ const NEAR: usize = 12;
 
 /// Computes the noise of all stages around a model.
 ///
-/// The variance is a sum of two parts. The first is the output's own noise: known, or estimated
-/// from the second differences of the recording, or from those of the residual if these are clearly
-/// smaller. The second is the *transmitted noise*, the part of the measured input's noise that
-/// reaches the output. It is computed by Monte Carlo with the same draws for every model. It
-/// differs from sample to sample, because it is larger where the output is steep or the input is
-/// too fast to be smoothed.
+/// The variance is a sum of two parts. The first is the output's own noise: known, or estimated from the second
+/// differences of the recording, or from those of the residual if these are clearly smaller. The second is the
+/// *transmitted noise*, the part of the measured input's noise that reaches the output. It is computed by Monte Carlo
+/// with the same draws for every model. It differs from sample to sample, because it is larger where the output is
+/// steep or the input is too fast to be smoothed.
 pub(crate) fn noise_levels(
     runs: &Runs<'_>,
     roles: &SampleRoles,

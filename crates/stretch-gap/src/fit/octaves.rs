@@ -176,8 +176,9 @@ mod tests {
         }
     }
 
-    /// If the first effect closed nothing, the remaining residual is not its discrepancy. If it
-    /// closed much, a small further improvement is not credited to a second effect.
+    /// Octave by octave: if the first effect reduced the residual much, a small further reduction
+    /// may only correct the form of this effect, so it is not credited to a second effect. If the
+    /// first effect reduced nothing in an octave, every further reduction there is credited.
     #[test]
     fn discrepancy_is_a_share_of_what_was_closed_in_its_octave() {
         let of = |slow: f64, quick: f64| {

@@ -140,7 +140,7 @@ pub(crate) fn samples_per_observation(parts: &[&[f64]], block: usize) -> f64 {
     (1.0 + 2.0 * sum).min(block as f64)
 }
 
-/// Returns S of the module documentation, without the priors of forms.
+/// Returns the score S of the module documentation. It does not contain the priors of the effects' forms.
 pub(crate) fn score(
     nominal: &[Misfit],
     misfits: &[Misfit],

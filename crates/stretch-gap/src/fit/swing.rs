@@ -129,7 +129,7 @@ impl Metric {
     }
 }
 
-/// Returns the median power of the neighbouring frequencies.
+/// Returns the median power of the frequencies around index `k`.
 fn usual(powers: &[f64], k: usize) -> f64 {
     let mut beside = powers[k.saturating_sub(BESIDE)..(k + BESIDE).min(powers.len())].to_vec();
     beside.sort_by(f64::total_cmp);

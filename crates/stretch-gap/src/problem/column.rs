@@ -68,9 +68,9 @@ pub struct Column<'a> {
     pub name: Cow<'a, str>,
     /// Unit; `1` if dimensionless.
     pub unit: Cow<'a, str>,
-    /// Values of all trials, concatenated. They are empty if this entry represents a group of
-    /// commands. In the [facts of a record](crate::RecordFacts) they are also empty for the output
-    /// of a stage, because `Simulator::measured` returns these values.
+    /// Values of all trials, concatenated. They are empty if this entry represents a group of commands. In the [facts
+    /// of a recording](crate::RecordFacts) they are also empty for the output of a stage, because `Simulator::measured`
+    /// returns these values.
     pub values: Cow<'a, [f64]>,
     /// The stage whose output this column is; `None` if it is not an output.
     pub output_of: Option<usize>,

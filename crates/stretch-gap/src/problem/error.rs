@@ -38,7 +38,7 @@ pub enum GapError {
     /// The integration step is so long that halving it changes the output by an amount that is not
     /// small compared with the noise.
     #[error(
-        "{stage}: halving the step of integration moves the output by {moved} of its noise, so the step is too long for an accurate \
+        "{stage}: halving the step of integration moves the output by {moved} times its noise, so the step is too long for an accurate \
          result: a number in the rig file makes this stage much faster than a real rig (a volume that is too small, a conductance, \
          friction or time constant in another unit); if the simulator is your own, shorten its step"
     )]

@@ -162,7 +162,7 @@ impl Noise {
     /// See [`noise_variance`].
     pub fn of_differences<'a>(stretches: impl Iterator<Item = &'a [f64]>, dt_s: f64) -> Self {
         let sd = noise_variance(stretches, dt_s).sqrt();
-        Self::white(sd, "second differences of the record".into(), DIFFERENCES_KNOWN_TO)
+        Self::white(sd, "second differences of the recording".into(), DIFFERENCES_KNOWN_TO)
     }
 
     /// Replaces a level that was estimated from second differences by a smaller one, estimated from
@@ -178,7 +178,7 @@ impl Noise {
         match variance < (1.0 - DIFFERENCES_KNOWN_TO) * self.sd().powi(2) {
             true => Self {
                 white: variance.sqrt(),
-                source: "second differences of what the simulator leaves".into(),
+                source: "second differences of the residual".into(),
                 ..self
             },
             false => self,
@@ -274,7 +274,7 @@ impl Shapes {
         let white = level(&|k| self.white[k]);
         // A mean of N squared normal variables has the relative variance 2/N.
         let known_to = (2.0 / (n * self.waves.len() as f64)).sqrt();
-        let mut best = Noise::white(white.sqrt(), "noise of the record".into(), known_to);
+        let mut best = Noise::white(white.sqrt(), "noise of the recording".into(), known_to);
         let mut least = cost(&|k| white * self.white[k]) + price;
         if let Some(sd) = stated.filter(|sd| *sd > 0.0) {
             let own = cost(&|k| sd * sd * self.white[k]);
@@ -290,7 +290,7 @@ impl Shapes {
                 if own < least {
                     least = own;
                     let (white, slow) = (((1.0 - share) * all).sqrt(), (share * all).sqrt());
-                    let source = "noise of the record, some of it slow".to_owned();
+                    let source = "noise of the recording, some of it slow".to_owned();
                     best = Noise { white, slow, memory_samples, source, known_to };
                 }
             }

@@ -45,7 +45,7 @@ impl Noise {
     /// let output: Vec<f64> = steps.iter().map(|x| 2.0 * x + 0.05 * random.gauss()).collect();
     /// let noise = Noise::of_rests(&output, &[&steps], &[0..3000], 0.01).unwrap();
     /// assert!((noise.sd() / 0.05 - 1.0).abs() < 0.1);
-    /// assert_eq!(noise.source(), "rests of the record: 19.2 s in which the inputs stand still");
+    /// assert_eq!(noise.source(), "rests of the recording: 19.2 s in which the inputs stand still");
     /// assert_eq!(Noise::of_rests(&output, &[&output], &[0..3000], 0.01), None);
     /// ```
     pub fn of_rests(
@@ -63,7 +63,8 @@ impl Noise {
         let kept: Vec<f64> = powers.into_iter().filter(|p| *p <= most).collect();
         let mean = kept.iter().sum::<f64>() / kept.len() as f64;
         let seconds = (kept.len() * PART) as f64 * dt_s;
-        let source = format!("rests of the record: {seconds:.1} s in which the inputs stand still");
+        let source =
+            format!("rests of the recording: {seconds:.1} s in which the inputs stand still");
         let known_to = (2.0 * TOGETHER / (kept.len() * PART).max(1) as f64).sqrt();
         (kept.len() >= FEWEST && mean > 0.0).then(|| Self::white(mean.sqrt(), source, known_to))
     }

@@ -161,9 +161,9 @@ fn others_move(others: &[&[f64]], (from, to): (usize, usize), share: f64) -> boo
     })
 }
 
-/// Returns the stretches in which a column stays within its noise while another column covers most
-/// of its range. The slack of a loose sleeve would hide less motion than that. A signal that
-/// repeats within ten samples counts as fast motion rather than noise, unless it is mains hum.
+/// Returns the stretches in which a column stays within its noise while another column covers most of its range. A
+/// loose sleeve hides a smaller part of the range, so its slack is not reported. A signal that repeats within ten
+/// samples counts as fast motion, not as noise, unless it is mains hum.
 fn dead(
     values: &[f64],
     others: &[&[f64]],

@@ -87,10 +87,10 @@ impl Gross {
         Self {
             factor: Some(factor),
             sentence: format!(
-                "the simulator's {} is {ratio} times the record's{that_is}",
+                "the simulator's {} is {ratio} times the recording's{that_is}",
                 column.name
             ),
-            hint: "let the simulator answer in the unit of the record, or convert the record, or give the parameters of the simulator tolerances"
+            hint: "let the simulator answer in the unit of the recording, or convert the recording, or give the parameters of the simulator tolerances"
                 .into(),
             units,
             ..Self::of_column(GrossKind::Factor, column)
@@ -196,8 +196,8 @@ pub(crate) fn sentence(gross: &[Gross]) -> String {
     };
     let wrong = match first.what {
         GrossKind::Parameter => "A parameter of the simulator does not fit the rig",
-        GrossKind::Factor => "Simulator and record differ by a factor",
-        _ => "The record is wrong",
+        GrossKind::Factor => "Simulator and recording differ by a factor",
+        _ => "The recording is wrong",
     };
     format!("{wrong}: {}{other}; {}.", first.sentence, first.hint)
 }

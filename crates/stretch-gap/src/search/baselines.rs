@@ -38,8 +38,8 @@ pub struct Baselines {
     /// Effect whose simulated change correlates best with the residual, after nominal sensitivities
     /// are projected out.
     pub signature: Option<String>,
-    /// Single effect with the best Bayesian information criterion. Each is fitted jointly with the
-    /// parameters, and samples count as independent.
+    /// Single effect with the best Bayesian information criterion. Each effect is fitted jointly with the parameters.
+    /// The criterion treats the samples as independent.
     pub bic: Option<String>,
 }
 

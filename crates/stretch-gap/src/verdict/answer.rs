@@ -48,9 +48,9 @@ pub enum Answer {
     /// The simulator leaves more than the stated noise would in 19 of 20 recordings, but too little
     /// to name a cause.
     Faint {
-        /// What the re-tuned simulator leaves.
+        /// Root mean square of the residual of the re-tuned simulator, in multiples of the noise.
         left: f64,
-        /// What noise alone leaves at most in 19 of 20 recordings.
+        /// The same for noise alone: it is below this value in 19 of 20 recordings.
         noise: f64,
         /// Stage that contains most of it.
         stage: String,

@@ -55,7 +55,7 @@ impl TooLittle {
                 let (least_fit_s, least_test_s) =
                     (seconds(LEAST_FIT * block_s), seconds(LEAST_TEST * block_s));
                 format!(
-                    "The record is too short to name an effect: {fit_s:.1} s to fit and {test_s:.1} s to test on. Record at least \
+                    "The recording is too short to name an effect: {fit_s:.1} s to fit and {test_s:.1} s to test on. Record at least \
                      {least_fit_s} s to fit and {least_test_s} s to test on; without test trials four times {least_test_s} s in all."
                 )
             }

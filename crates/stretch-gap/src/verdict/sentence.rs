@@ -69,7 +69,7 @@ impl Diagnosis {
             Some(Answer::Missing { .. } | Answer::Partly { .. }) => {
                 "Add them to the simulator, then diagnose again."
             }
-            Some(Answer::WrongRecord { .. }) => "Put the record right, then diagnose again.",
+            Some(Answer::WrongRecord { .. }) => "Correct the recording, then diagnose again.",
             Some(Answer::Unknown { .. })
                 if self.proposed.as_ref().is_some_and(|p| !p.equation.is_empty()) =>
             {

@@ -1,5 +1,5 @@
-//! Simulators whose answers are known: a line, a lag, an oscillator, a delay, alone or one after the other, with a record that the same
-//! equations made with other parameters, hidden effects and noise of a known size.
+//! Simulators whose answers are known: a line, a lag, an oscillator, a delay, alone or one after the other, with a
+//! recording that the same equations made with other parameters, hidden effects and noise of a known size.
 //!
 //! A [`Toy`] is plain data: a test alters what it needs and asks for the record. Everything that depends on the trait [`Simulator`] is
 //! in this folder. The crate's own unit tests use it, too.
@@ -49,7 +49,7 @@ pub(crate) struct Toy {
     pub(crate) stated: Option<f64>,
     /// Slow drift that the simulator says its recorder may have.
     pub(crate) recorder_drift: Option<SlowDrift>,
-    /// Standard deviation of the noise of the recorded `x`.
+    /// Standard deviation of the noise of the recordinged `x`.
     pub(crate) input_noise: f64,
     /// Samples of every trial, and whether it is tested on.
     pub(crate) trials: Vec<(usize, bool)>,
@@ -61,7 +61,7 @@ pub(crate) struct Toy {
     pub(crate) units: [f64; 2],
     /// Runs that may be made, where they are counted.
     pub(crate) budget: Option<usize>,
-    /// Samples of all trials end to end that were not measured.
+    /// Whether each sample, of all trials end to end, was lost (not measured); empty if all were measured.
     pub(crate) is_lost: Vec<bool>,
     /// Stages whose first parameter is another one: the stage, and the parameter.
     pub(crate) shared: Vec<(usize, usize)>,
@@ -194,7 +194,7 @@ impl Toy {
         p
     }
 
-    /// The record that the bench makes, drawn from a seed: `x` is four tones a trial, with values within -1..1.
+    /// The recording that the bench makes, drawn from a seed: `x` is four tones a trial, with values within -1..1.
     pub(crate) fn measured(&self, seed: u64) -> Measured {
         let x = self.trials.iter().enumerate().flat_map(|(trial, (samples, _))| {
             let mut random = RandomGenerator::new(seed, 100 + trial as u64);
@@ -211,7 +211,7 @@ impl Toy {
         self.driven_by(x.collect(), seed)
     }
 
-    /// The record that the bench makes of an input of one's own, in the units of -1..1.
+    /// The recording that the bench makes of an input of one's own, in the units of -1..1.
     pub(crate) fn driven_by(&self, x: Vec<f64>, seed: u64) -> Measured {
         assert_eq!(x.len(), self.samples(), "one sample of x for each of the trials");
         let mut random = RandomGenerator::new(seed, 7);

@@ -51,7 +51,7 @@ impl Measured {
         Self { toy, description, x, outputs, runs: Arc::default() }
     }
 
-    /// The same toy with a record that says something else of `x` and of the outputs.
+    /// The same toy with a recording that says something else of `x` and of the outputs.
     pub(crate) fn rewritten(self, by: impl FnOnce(&mut Vec<f64>, &mut [Vec<f64>])) -> Self {
         let Self { toy, mut x, mut outputs, .. } = self;
         by(&mut x, &mut outputs);

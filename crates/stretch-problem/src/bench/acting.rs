@@ -68,8 +68,8 @@ pub(crate) fn lines(
 }
 
 impl<'a> Acting<'a> {
-    /// Divides the effects of a model, and the effects that the simulator already has, into `inside` and `found`. An
-    /// effect of a rig file is also estimated from the recording if its kind is.
+    /// Divides the effects of a model, and the effects that the simulator already has, into `inside` (simulated) and
+    /// `found` (estimated from the recording), by their kinds.
     pub(crate) fn of(
         base: &'a EffectSet,
         rows: &'a [&'static Effect],

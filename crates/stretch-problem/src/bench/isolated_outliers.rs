@@ -18,8 +18,8 @@ const OUTLIER: f64 = 8.0;
 /// Share of the greater of the two steps beside the sample that is added to the limit. A kink from rest gives a |d| of
 /// a third of that step.
 const KINK: f64 = 0.5;
-/// Least ratio of the |d| of an outlier to the |d| of its neighbours. A step of the motion gives a ratio of 1, a single
-/// outlier a ratio of 3/2.
+/// Smallest ratio of the |d| of an outlier to the |d| of its neighbours. A step of the motion gives a ratio of 1, a
+/// single outlier a ratio of 3/2.
 const STEP: f64 = 1.25;
 
 /// Measured columns of a rig.

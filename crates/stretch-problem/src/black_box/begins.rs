@@ -19,15 +19,15 @@ use std::ops::Range;
 
 use stretch_data::ends;
 
-/// Least number of samples of a span in which the inputs are constant.
+/// Smallest number of samples of a span in which the inputs are constant.
 const SPAN: usize = 20;
-/// Least number of spans that determine a line and its residual.
+/// Smallest number of spans that determine a line and its residual.
 const FEWEST: usize = 4;
-/// Least squared correlation for which the line is used.
+/// Smallest squared correlation for which the line is used.
 const EXPLAINED: f64 = 0.99;
-/// Least difference between the command from before and the first command, in standard deviations.
+/// Smallest difference between the command from before and the first command, in standard deviations.
 const FAR: f64 = 5.0;
-/// Least motion of the output in a trial that begins with a step, as a share of the output's range.
+/// Smallest motion of the output in a trial that begins with a step, as a share of the output's range.
 const MOVES: f64 = 0.1;
 
 /// By trial, the command from before a step at its first sample; `None` if a trial begins

@@ -26,7 +26,7 @@ use super::{
 };
 use crate::wrap::{Placed, Trials};
 
-/// Least change of an output that counts as motion, as a share of its noise.
+/// Smallest change of an output that counts as motion, as a share of its noise.
 const MOVED: f64 = 0.02;
 /// Greatest change of an output that counts as rounding, as a share of its greatest value.
 const ROUNDING: f64 = 1e-9;

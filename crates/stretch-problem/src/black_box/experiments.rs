@@ -20,7 +20,7 @@ use crate::bench::courses::{course, moving};
 const MOVED: usize = 3;
 /// Time to prepare a candidate, minutes.
 const PREPARE_MIN: f64 = 0.25;
-/// Least noise of an output, a share of its range.
+/// Smallest noise of an output, a share of its range.
 const LEAST_NOISE: f64 = 1e-6;
 
 /// The external inputs of the simulator, by column, with as many samples as the first trial.

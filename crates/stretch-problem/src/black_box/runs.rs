@@ -17,7 +17,7 @@ use crate::black_box::{
 
 /// Number of samples that are kept, of all runs together: a quarter of a gigabyte.
 const KEPT: usize = 1 << 25;
-/// Least number of runs that are kept.
+/// Smallest number of runs that are kept.
 const FEWEST: usize = 32;
 
 /// Everything that a run depends on, bit by bit.

@@ -184,7 +184,7 @@ pub struct Parameter {
     #[serde(default, with = "tolerance", skip_serializing_if = "tolerance::is_exact")]
     #[schemars(schema_with = "tolerance::schema")]
     pub tolerance: Tolerance,
-    /// Least plausible value. Without it, a value whose tolerance is a share of it, or less than it, keeps its sign.
+    /// Smallest plausible value. Without it, a value whose tolerance is a share of it, or less than it, keeps its sign.
     pub least: Option<f64>,
     /// Greatest plausible value.
     pub greatest: Option<f64>,
@@ -225,7 +225,7 @@ struct WrittenEffect {
     /// Unit; empty if there is none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     unit: String,
-    /// Least and greatest plausible value; needed without `[[effect.argument]]`.
+    /// Smallest and largest plausible value; needed without `[[effect.argument]]`.
     #[serde(default, deserialize_with = "range")]
     range: Option<[f64; 2]>,
     /// Value at which it does nothing; omitted for a shape parameter.
@@ -302,7 +302,7 @@ pub struct Argument {
     /// Unit; empty if there is none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub unit: String,
-    /// Least and greatest plausible value.
+    /// Smallest and largest plausible value.
     #[serde(deserialize_with = "range")]
     pub range: [f64; 2],
     /// Value at which it does nothing; omitted for a shape parameter, which has the middle of its range while the effect is off.

@@ -15,7 +15,7 @@ pub struct State {
     /// Unit of the state.
     #[serde(default)]
     pub unit: String,
-    /// Least value that the state takes in the recorded session.
+    /// Smallest value that the state takes in the recorded session.
     pub least: f64,
     /// Greatest value that the state takes in the recorded session.
     pub greatest: f64,

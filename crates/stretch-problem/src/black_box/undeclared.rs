@@ -23,7 +23,7 @@ use super::{
     runs::{Inner, Runs},
 };
 
-/// Least change of an output that is reported, in multiples of its noise.
+/// Smallest change of an output that is reported, in multiples of its noise.
 const LEAST: f64 = 1.0;
 /// Greatest number of names that a sentence lists.
 const LISTED: usize = 3;

@@ -13,14 +13,14 @@ pub(super) struct Group {
 /// Greatest number of distinct values of a column that is set, such as a supply voltage. A column
 /// with more values counts as measured.
 const MOST_LEVELS: usize = 12;
-/// Least share of the samples at which a column that is set repeats the value of the sample before.
+/// Smallest share of the samples at which a column that is set repeats the value of the sample before.
 const HELD: f64 = 0.9;
-/// Least distance between the medians of two set-ups, as a share of the range of all medians. The
-/// distance must also exceed the spread within every trial.
+/// Smallest distance between the medians of two set-ups, as a share of the range of all medians.
+/// The distance must also exceed the spread within every trial.
 const APART: f64 = 0.1;
 /// Number of runs into which a column that moves within trials divides the samples.
 const PARTS: usize = 4;
-/// Least number of samples of a group; smaller groups are dropped.
+/// Smallest number of samples of a group; smaller groups are dropped.
 const FEWEST: usize = 20;
 
 /// Returns one group for each trial.

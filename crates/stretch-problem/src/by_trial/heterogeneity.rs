@@ -25,7 +25,7 @@ pub struct Heterogeneity {
     pub unit: String,
     /// Mean of the runs, weighted by the inverse variance of each.
     pub mean: f64,
-    /// Least and greatest value over the runs that determine it.
+    /// Smallest and largest value over the runs that determine it.
     pub range: [f64; 2],
     /// Number of runs that determine it.
     pub runs: usize,

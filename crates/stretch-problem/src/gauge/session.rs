@@ -14,7 +14,7 @@ use crate::{
     error::{ProblemError, check_rate},
 };
 
-/// Least number of samples to fit.
+/// Smallest number of samples to fit.
 const LEAST: usize = 300;
 /// Parts of a trial with fewer samples are left out.
 const SHORTEST: usize = 100;
@@ -72,7 +72,7 @@ impl GaugeSession {
         looked_at(&self.trials).into_iter()
     }
 
-    /// Least and greatest value of a column over the trials that are fitted.
+    /// Smallest and largest value of a column over the trials that are fitted.
     pub(super) fn range(&self, values: &[f64]) -> (f64, f64) {
         ends(self.fitted().flat_map(|r| &values[r]))
     }

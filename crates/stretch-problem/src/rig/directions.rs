@@ -16,7 +16,7 @@ pub(super) struct Motion<'a> {
 const BLOCK_S: f64 = 0.1;
 /// Longest time by which commands may be shifted, s.
 const FARTHEST_S: f64 = 10.0;
-/// Least share of the sum of squares that an error must explain to be named.
+/// Smallest share of the sum of squares that an error must explain to be named.
 const LEAST: f64 = 0.1;
 
 /// The wrong column and a hint, for measurements in which the muscle lengthens while the inlet is open.

@@ -8,7 +8,7 @@ use super::{RigSession, RigTrial};
 
 /// Share of the samples at one value above which chance does not explain the repeated value.
 const SHARE: f64 = 0.002;
-/// Least noise of a recording that is judged, as a share of the stated noise. A channel with less noise repeats its
+/// Smallest noise of a recording that is judged, as a share of the stated noise. A channel with less noise repeats its
 /// value at rest.
 const NOISY: f64 = 0.3;
 

@@ -30,7 +30,7 @@ const EXCITATION: &str = "excitation_share";
 const SHORTEST: usize = 100;
 /// Range that noise alone hardly ever reaches, standard deviations.
 const NOISE_SPAN: f64 = 15.0;
-/// Least number of samples to fit.
+/// Smallest number of samples to fit.
 const LEAST: usize = 300;
 
 /// A measured trial of the rig, on the session's even grid; all channels have the same length.

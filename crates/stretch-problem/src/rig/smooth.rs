@@ -8,7 +8,7 @@ use super::cache::LastResults;
 
 /// Greatest half-width of a smoothing window, in samples.
 const WIDEST: usize = 15;
-/// Least half-width of a smoothing window, in samples.
+/// Smallest half-width of a smoothing window, in samples.
 const NARROWEST: usize = 2;
 /// Longest time that the greatest and the least half-width may last, s. At a low rate the windows have fewer samples,
 /// because a valve acts just as fast there. A window of less than [`NARROWEST`] samples on either side is not smoothed.

@@ -18,14 +18,14 @@ use std::borrow::Cow;
 
 use stretch_gap::ParameterSpec;
 
-/// Mean lead and its standard deviation. The mean lead is 1/2 for switches anywhere in a sample,
-/// 1/4 if every second row was dropped, and 0 for a log as fast as the controller; three standard
-/// deviations end at a whole sample.
+/// Prior of the mean lead: value and standard deviation. The mean lead is 1/2 for switches anywhere in a sample, 1/4 if
+/// every second row was dropped, and 0 for a log as fast as the controller; three standard deviations end at a whole
+/// sample.
 const MEAN: (f64, f64) = (0.25, 0.25);
 
 /// Period of the rig's controller, s.
 const CONTROL_S: f64 = 0.01;
-/// Least ratio of a log's sample time to that period at which a switch may fall between two rows.
+/// Smallest ratio of a log's sample time to that period at which a switch may fall between two rows.
 const SLOWER: f64 = 1.2;
 
 /// Whether commands may switch between the rows of a log.

@@ -50,7 +50,7 @@ pub(super) fn kind(frame: &WorkerFrame, wanted: &str) -> Result<(), Wrong> {
         Some(kind) if kind == wanted => Ok(()),
         Some("error") => Err(format!("it reports: {}", text("message").unwrap_or("no message"))),
         Some(other) => Err(format!("it answers with the kind {other:?} instead of {wanted:?}")),
-        None => Err(format!("it answers without a kind instead of with the kind {wanted:?}")),
+        None => Err(format!("its answer has no key \"kind\"; it must be {wanted:?}")),
     }
 }
 

@@ -94,9 +94,8 @@ impl WorkersSpec {
 
 /// Workers (processes that run a simulator) that answer requests for runs.
 ///
-/// A worker that dies, hangs or does not keep to the protocol is started anew, and its batch is
-/// repeated once. If the batch fails again, the source is [gone](SourceError::Gone), and the error
-/// holds what the worker printed last.
+/// A worker that dies, hangs or does not keep to the protocol is restarted, and its batch is repeated once. If the
+/// batch fails again, the source is [gone](SourceError::Gone), and the error holds what the worker printed last.
 #[derive(Debug)]
 pub struct Workers {
     spec: WorkersSpec,
@@ -298,7 +297,7 @@ impl Source for Workers {
     fn notes(&self) -> Vec<String> {
         let restarts = self.restarts.load(Ordering::Relaxed);
         let note = format!(
-            "a worker of the simulator failed and was started anew {restarts} time(s); its batch was repeated"
+            "a worker of the simulator failed and was restarted (restarts: {restarts}); its batch was repeated"
         );
         self.session_notes.iter().cloned().chain((restarts > 0).then_some(note)).collect()
     }

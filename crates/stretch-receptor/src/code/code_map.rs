@@ -59,7 +59,7 @@ impl Span {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CodeSurface<S> {
-    /// The code, aligned to 16 bits, about which the surface is expanded.
+    /// Centre of the expansion of the surface: a code of the converter, shifted to 16 bits.
     pub centre: u16,
     /// Range to which the signal is clamped, as a distance from the centre in `2^-15` of a 16-bit step.
     pub signal: Span,

@@ -20,7 +20,7 @@ const UNBEGUN: i32 = i32::MIN;
 const FURTHEST: i32 = 8 << TARGET_BITS;
 /// Largest magnitude of a drive, the input of the gauge's curve.
 const MOST_DRIVE: i32 = 1 << 30;
-/// Least length of a secant of the curve, as a share of the distance between knots.
+/// Smallest length of a secant of the curve, as a share of the distance between knots.
 const LEAST_RUN: i32 = (1 << PLACE_BITS) / 100;
 
 /// An [`ObserverReceptor`](crate::ObserverReceptor) in 32-bit integers: the same filter with the same table of gains.

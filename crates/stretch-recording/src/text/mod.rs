@@ -68,7 +68,8 @@ struct Table<'a> {
     rate_hz: Option<f64>,
     comments: usize,
     bad: BadRows,
-    /// Number of bad rows that are samples. If the time is the sample count, they are counted too.
+    /// Number of bad rows with a wrong value. Each of them is a sample, so a time that is computed
+    /// from the number of samples counts them too.
     lost: usize,
     notes: Vec<String>,
 }

@@ -40,7 +40,7 @@ impl Bridge {
         }
     }
 
-    /// Returns the same bridge with its trim lowered by a share.
+    /// Returns the same bridge with its trim reduced by `share` (0 to 1).
     #[inline]
     pub fn shunted(&self, share: f64) -> Self {
         Self { trim: self.trim * (1.0 - share), ..*self }

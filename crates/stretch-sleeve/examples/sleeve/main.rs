@@ -81,12 +81,13 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints the geometric means of errors and of their ratios, and the worst ratio.
+/// Prints the geometric means of the errors and of their ratios to two other errors: to that of the line, and to that
+/// of a calibration fitted to the session itself.
 fn print(title: &str, rows: &[Row]) {
     let Some(first) = rows.first() else { return };
     println!("\n### {title}: {} sessions\n", rows.len());
     println!(
-        "| calibration | sessions | RMSE | to the line | worst | above 1.05 | to the session's own | within the 95 % interval |"
+        "| calibration | sessions | RMSE | ratio to the line's RMSE: mean | largest | sessions with a ratio above 1.05 | ratio to the RMSE of the session's own calibration | share within the 95 % interval |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     let mean = |values: &mut dyn Iterator<Item = f64>| {

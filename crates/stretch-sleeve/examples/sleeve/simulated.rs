@@ -41,7 +41,7 @@ pub(crate) fn print(hours: f64) -> anyhow::Result<()> {
         let SleeveCalibration::Many(calibration) =
             calibrate_array(std::slice::from_ref(&calibrated), &options)?.calibration
         else {
-            anyhow::bail!("five gauges make a record of several");
+            anyhow::bail!("five gauges make a calibration of several");
         };
         let values = &calibrated.channels[0].values;
         let repeats = values.windows(2).filter(|w| w[0] == w[1]).count() as f64;

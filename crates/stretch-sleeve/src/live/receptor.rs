@@ -15,21 +15,21 @@ use super::{
 /// A receptor of up to `N` gauges that share a recorder.
 ///
 /// For each sample:
-/// 1. A channel is lost, until [`ArrayMemory::readmit`] takes it back, if it is missing for more than [`MAX_BRIDGED`]
-///    samples, if it leaves its possible range, or if it repeats one value ([`Repeats`]) while another channel changes.
-///    If all channels repeat, the recorder repeats and no channel is lost. A channel is also lost if its difference
-///    from what the others predict jumps ([`Jump`]) by more than `largest_jump`. A slip changes the differences of
-///    neighbouring channels as well, so the channel whose slip explains most of all jumps is excluded. If only two
-///    channels move together, it cannot be determined which one slipped. Once a channel is lost, the remaining ones are
-///    no longer compared.
+/// 1. Faulty channels are excluded ("lost") until [`ArrayMemory::readmit`] is called. A channel is lost if
+///    - its sample is missing more than [`MAX_BRIDGED`] times in a row,
+///    - it leaves its possible range,
+///    - it repeats one value ([`Repeats`]) while another channel changes (if all channels repeat their values, the
+///      recorder repeats its samples, and no channel is lost), or
+///    - it slips: its difference from the value that the other channels predict jumps ([`Jump`]) by more than
+///      `largest_jump`. A slip also changes these differences of other channels, so only the channel whose slip explains
+///      the largest part of all jumps is excluded. If only two channels move together, it cannot be determined which of
+///      them slipped. As soon as a channel is lost, no further slips are searched for.
 /// 2. The states of each channel are computed, each shifted and scaled into its domain.
-/// 3. The gains for the remaining channels are selected: for all, for all but one, or for the best
-///    single channel.
+/// 3. The gains for the remaining channels are selected: for all, for all but one, or for the best single channel.
 ///
-/// A missing sample is bridged by the channel's last one. If no channel in use has a sample, the
-/// recorder is silent, which is no fault of a channel: [`MAX_BRIDGED`] such samples are bridged,
-/// and one more clears the signals but not the list of lost channels. Cost: two products and two
-/// sums for each term of a channel in use.
+/// A missing sample is replaced by the channel's last one. If the samples of all channels in use are missing, this is a
+/// fault of the recorder and no channel is lost: [`MAX_BRIDGED`] such samples are replaced, and one more clears the
+/// signals but not the list of lost channels. Cost: two products and two sums for each term of a channel in use.
 ///
 /// ```
 /// use stretch_core::{Runner, Stage};

@@ -107,7 +107,7 @@ fn jitter_is_told_with_its_size_in_coloured_noise() {
     }
 }
 
-/// None of 96 records without jitter is reported to have any.
+/// None of 96 recordings without jitter is reported to have any.
 #[test]
 fn nothing_else_is_jitter() {
     let lacks = [

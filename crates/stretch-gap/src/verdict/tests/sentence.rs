@@ -299,8 +299,8 @@ fn cases(simulator: &dyn Simulator) -> Vec<(&'static str, Case)> {
             "other units",
             wrong(vec![gross(
                 "factor",
-                "the simulator's y0 is 57.3 times the record's: that is deg for rad",
-                "convert the record",
+                "the simulator's y0 is 57.3 times the recording's: that is deg for rad",
+                "convert the recording",
             )]),
         ),
         ("parameters at their bounds", missing(&[PLAY]).overruled(Overruled::AtBounds(ended))),

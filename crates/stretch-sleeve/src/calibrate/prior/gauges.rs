@@ -11,8 +11,8 @@ use crate::{
 
 use super::learnt::Prior;
 
-/// Greatest ratio of squared distances at which gauges count as exchanged or reversed. The distance of their signals
-/// from those of the sessions is then halved if the signals are exchanged or reversed.
+/// Gauges count as exchanged or reversed if exchanging or reversing their signals reduces the squared distance of the
+/// signals from those of the prior's sessions to less than this share, that is, halves the distance.
 const NEARER: f64 = 0.25;
 
 /// Mean and covariance of the signals of several gauges.

@@ -16,7 +16,8 @@ use crate::calibrate::linear::{inverse, symmetric};
 
 use super::record::{list, triangle};
 
-/// Weight of the diagonal in a covariance, in nodes per term. It is needed because there are few nodes per term.
+/// Weight of the prior of a covariance (its own diagonal), as a number of nodes per term. Few nodes per term would not
+/// determine the covariance without this prior.
 const SHRINKAGE: f64 = 0.3;
 /// Variance of each coefficient at the start, and the smallest variance, in normalised target.
 const FIRST: f64 = 0.05;

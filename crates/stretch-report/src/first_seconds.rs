@@ -99,8 +99,11 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
                 d.ambiguous.iter().filter(|n| !d.named.contains(n)).cloned().collect();
             let rest = if !d.tied.is_empty() {
                 "that is the probability of all alternatives together".to_owned()
-            } else if rivals.is_empty() && d.answer.as_ref().is_some_and(Answer::leaves_more_than_noise) {
-                "nothing else that was tried explains as much, and more than noise is left".to_owned()
+            } else if rivals.is_empty()
+                && d.answer.as_ref().is_some_and(Answer::leaves_more_than_noise)
+            {
+                "nothing else that was tried explains as much, and more than noise is left"
+                    .to_owned()
             } else if rivals.is_empty() {
                 "nothing else explains these data as well".to_owned()
             } else {

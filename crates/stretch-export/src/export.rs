@@ -5,7 +5,9 @@ use std::{fmt, str::FromStr};
 use stretch_calibrate::{
     CalibrateError, FIXED_STEP, RecordNumbers, SpellingError, calibration_seal, fixed_record,
 };
-use stretch_core::{Branch, Calibration, Label, Model, Provenance, SampleRate, Target};
+use stretch_core::{
+    Branch, Calibration, Label, Model, Provenance, SampleRate, Target, record::checksum,
+};
 use stretch_receptor::code::Adc;
 use stretch_sleeve::{ArrayCalibration, GaugeCalibration, Turns, array_seal};
 
@@ -289,6 +291,8 @@ fn assembled(
     parts.iter().for_each(|part| text += &kept(part, &has));
     text += self_test;
     text += "\n#endif\n";
+    let id = format!("0x{:08x}u", checksum(text.as_bytes()));
+    let text = text.replace("@ID@", &id);
     let branches = [Branch::Inflation, Branch::Deflation].map(|b| source.target.branch_name(b));
     Header { text, form, model, pressure, array: None, step: source.step(form), branches }
 }

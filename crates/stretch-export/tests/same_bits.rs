@@ -531,6 +531,46 @@ fn a_header_has_the_defects_that_its_map_has() {
     );
 }
 
+/// A file that includes one header twice compiles. A file that includes the headers of two calibrations, of two forms
+/// or of two converters does not, because the second header would be left out.
+#[test]
+fn a_second_header_in_a_file_is_an_error_that_says_what_to_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let of = |calibration: &Calibration, form, adc| {
+        let options = Options { form: Some(form), adc: parse_adc(adc).unwrap() };
+        header(calibration, &options).unwrap()
+    };
+    let (elbow, knee) = (stretch_receptor::example_calibration(), example_observer());
+    let first = of(&elbow, Form::Float, "12,0,3.3");
+    fs::write(folder.path().join("first.h"), &first.text).unwrap();
+    let others = [
+        (of(&elbow, Form::Float, "12,0,3.3"), true),
+        (of(&knee, Form::Float, "12,0,3.3"), false),
+        (of(&elbow, Form::Fixed, "12,0,3.3"), false),
+        (of(&elbow, Form::Float, "10,0,5"), false),
+    ];
+    for (other, is_same) in others {
+        let library = arduino_library(&other, "Knee");
+        let text = &library.iter().find(|file| file.path == "src/stretch_Knee.h").unwrap().text;
+        fs::write(folder.path().join("stretch_Knee.h"), text).unwrap();
+        let main = "#include \"first.h\"\n#include \"stretch_Knee.h\"\n\
+                    int main(void) { return stretch_self_test(); }\n";
+        fs::write(folder.path().join("main.c"), main).unwrap();
+        let mut cc = Command::new("cc");
+        cc.args(["-std=c99", "-Wall", "-Wundef", "-pedantic", "-Werror", "-fsyntax-only"]);
+        let said = cc.arg(folder.path().join("main.c")).output().unwrap();
+        let error = String::from_utf8_lossy(&said.stderr);
+        assert_eq!(said.status.success(), is_same, "{error}");
+        let asks = error.contains("include each header in a C or C++ file of its own");
+        assert_eq!(asks, !is_same, "{error}");
+    }
+    // a header of release 0.1.0 defines the guard without a number
+    fs::write(folder.path().join("first.h"), "#define STRETCH_H\n").unwrap();
+    let mut cc = Command::new("cc");
+    let said = cc.arg("-fsyntax-only").arg(folder.path().join("main.c")).output().unwrap();
+    assert!(String::from_utf8_lossy(&said.stderr).contains("of its own"), "{said:?}");
+}
+
 #[test]
 fn integers_are_refused_for_named_defects() {
     let options = Options { form: Some(Form::Fixed), adc: adc() };

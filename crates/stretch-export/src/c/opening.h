@@ -25,8 +25,11 @@
 @end
  * stretch_self_test() returns 0 if the board computes the same results as the computer.
  */
+#if defined(STRETCH_H) && STRETCH_H + 0 != @ID@
+#error "stretch: this file already includes another header of stretch export; include each header in a C or C++ file of its own"
+#endif
 #ifndef STRETCH_H
-#define STRETCH_H
+#define STRETCH_H @ID@ /* checksum of this file, another for every header */
 
 #include <stdint.h>
 

@@ -34,9 +34,9 @@ const COMMANDS: [(&str, &str); 9] = [
 
 /// Removed options, each with a sentence on the replacement.
 const OPTIONS: [(&str, &str); 19] = [
-    ("--adc-bits", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
-    ("--adc-zero-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
-    ("--adc-full-scale-v", "write --adc BITS,ZERO_V,FULL_SCALE_V"),
+    ("--adc-bits", "write --adc BITS,ZERO,FULL_SCALE"),
+    ("--adc-zero-v", "write --adc BITS,ZERO,FULL_SCALE"),
+    ("--adc-full-scale-v", "write --adc BITS,ZERO,FULL_SCALE"),
     (
         "--allow-commands",
         "name the problem.toml itself instead of its folder, which allows its simulator to run",

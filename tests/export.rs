@@ -206,7 +206,49 @@ fn integers_that_the_model_or_the_converter_does_not_allow() {
         &["the converter measures from 0 to 1", "--adc"],
     );
     assert_eq!(scratch.names(), before);
-    runs(export(&calibration, &out).args(["--adc", "12,0,1", "--form", "float"]));
+    let float = ["--adc", "12,0,1", "--form", "float"];
+    fails(export(&calibration, &out).args(float).arg("--arduino"), &["from 0 to 1", "10,0,1023"]);
+    assert_eq!(scratch.names(), before);
+    let said = export(&calibration, &out).args(float).output().unwrap();
+    let note = String::from_utf8_lossy(&said.stderr);
+    assert!(said.status.success() && note.contains("STRETCH_ADC_PER_CODE"), "{note}");
+}
+
+/// A signal column of counts: the default converter and that of an Uno in volts measure another quantity.
+#[test]
+fn a_signal_in_counts_needs_a_converter_in_counts_in_every_form() {
+    let scratch = Scratch::new();
+    let trial = fs::read_to_string(scratch.loops("volts.csv", 40.0, 1.1)).unwrap();
+    let counts = trial.lines().enumerate().map(|(n, line)| {
+        let (rest, volts) = line.rsplit_once(',').unwrap();
+        match volts.parse::<f64>() {
+            Ok(volts) => format!("{rest},{:.0}\n", 200.0 * volts),
+            Err(_) => format!("{rest},a0\n", rest = if n == 0 { rest } else { line }),
+        }
+    });
+    let trial = scratch.write("counts.csv", counts.collect::<String>());
+    let calibration = scratch.path("counts.json");
+    runs(calibrate(&trial, &calibration).args(["--model", "poly13", "--signal", "a0"]));
+    let out = scratch.path("Elbow");
+    for form in ["fixed", "float"] {
+        for adc in ["12,0,3.3", "10,0,5"] {
+            let mut command = export(&calibration, &out);
+            command.args(["--arduino", "--form", form, "--adc", adc]);
+            fails(&mut command, &["signal a0", "unit of the signal column", "10,0,1023"]);
+        }
+    }
+    for (adc, parts) in [
+        ("10,0,1023", [].as_slice()),
+        ("10,0,300", &["range of a0 is from 2", "measures from 0 to 300", "only a part"]),
+        ("10,0,100000", &["measures from 0 to 100000", "codes", "--adc"]),
+    ] {
+        let mut command = export(&calibration, &scratch.path(adc));
+        let said = command.args(["--arduino", "--form", "float", "--adc", adc]).output().unwrap();
+        let note = String::from_utf8_lossy(&said.stderr);
+        assert!(said.status.success(), "{note}");
+        assert!(parts.iter().all(|part| note.contains(part)), "{note}");
+        assert_eq!(note.contains("note:"), !parts.is_empty(), "{note}");
+    }
 }
 
 #[test]

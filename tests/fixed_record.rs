@@ -123,5 +123,5 @@ fn what_has_no_form_in_integers_says_so_and_writes_nothing() {
     let mut command = export(&float, &scratch.path("cal.fixed.postcard"));
     let output = command.args(["--adc", "12,3.3,0"]).output().expect("the program runs");
     assert_eq!(output.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&output.stderr).contains("BITS,ZERO_V"));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("BITS,ZERO,"));
 }

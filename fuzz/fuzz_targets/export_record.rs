@@ -12,7 +12,8 @@ fuzz_target!(|bytes: &[u8]| {
     let Some(adc) = adc(&calibration, which / 3) else { return };
     let form = [None, Some(Form::Fixed), Some(Form::Float)][usize::from(which % 3)];
     if let Ok(header) = header(&calibration, &Options { form, adc }) {
-        for file in arduino_library(&header, &String::from_utf8_lossy(bytes)) {
+        let library = arduino_library(&header, &String::from_utf8_lossy(bytes));
+        for file in library.into_iter().flatten() {
             let is_plain = |c: char| matches!(c, '\n' | '\t') || !c.is_control();
             assert!(file.text.chars().all(is_plain), "{}", file.text);
             for line in file.text.lines().filter(|line| line.ends_with(',')) {

@@ -1,7 +1,10 @@
 //! `stretch export`: exports a calibration for a board, and checks or renews the checksum of a
 //! calibration file.
 
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 use anyhow::{Context, anyhow, bail, ensure};
 use stretch_calibrate::{FIXED_STEP, FixedRecord, fixed_record, parse_adc};
@@ -14,6 +17,7 @@ use stretch_receptor::code::Adc;
 use stretch_sleeve::{RecordSummary, SleeveCalibration, describe_record, seal_record};
 
 use super::shared::{Completed, give_stdout, say, tell};
+use crate::display::warn;
 
 /// Export a calibration to a board, in C or as a file of integers; check or renew a file's seal
 ///
@@ -67,7 +71,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "cal.postcard")]
     fixed: Option<PathBuf>,
     /// The board's converter: bits, and the signal at code 0 and at the last code
-    #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
+    ///
+    /// ZERO and FULL_SCALE are in the unit of the signal column: volts such as 12,0,3.3, or counts such
+    /// as 10,0,1023 for a column of codes.
+    #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO,FULL_SCALE",
           value_parser = parse_adc)]
     adc: Adc,
     /// Check the file and renew its seal, after a hand edit or from an earlier release
@@ -104,11 +111,15 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             SleeveCalibration::Many(several) => array_header(several, &options),
         };
         let made = made.with_context(named)?;
-        let files = stage(&mut outputs, out, &made, args.arduino)?;
+        let files = stage(&mut outputs, out, &made, args.arduino).with_context(named)?;
         anyhow::Ok((out, made, files))
     });
     let c = c.transpose()?;
     outputs.keep()?;
+    let record = fixed.as_ref().and_then(|(_, record)| record.note.clone());
+    let header = c.as_ref().map_or(Vec::new(), |(_, made, _)| notes(made));
+    let all: BTreeSet<String> = record.into_iter().chain(header).collect();
+    all.iter().for_each(|note| warn(format!("note: {note}")));
     if let Some((path, FixedRecord { bytes, read_as, .. })) = &fixed {
         let (out, count) = (path.display(), bytes.len());
         tell(format!(
@@ -119,6 +130,16 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         Some((out, made, files)) if !is_standard_output(out) => explain(out, made, files),
         _ => Ok(()),
     }
+}
+
+/// Returns what to know about the converter of a header. A step in `float` takes the signal itself, so that a header
+/// for another converter can be used without its constants.
+fn notes(made: &Header) -> Vec<String> {
+    made.converter_notes().unwrap_or_else(|error| {
+        vec![format!(
+            "{error}; STRETCH_ADC_ZERO and STRETCH_ADC_PER_CODE convert no code correctly"
+        )]
+    })
 }
 
 /// Describes a calibration file and the state of its checksum, after renewing the checksum if
@@ -150,7 +171,7 @@ fn stage(
     }
     let files = if is_library {
         let folder = std::path::absolute(out)?;
-        arduino_library(made, &folder.file_name().unwrap_or_default().to_string_lossy())
+        arduino_library(made, &folder.file_name().unwrap_or_default().to_string_lossy())?
     } else {
         vec![File { path: HEADER.into(), text: made.text.clone() }]
     };

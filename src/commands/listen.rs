@@ -12,8 +12,8 @@ use std::{
 };
 
 use anyhow::Context;
-use stretch_calibrate::{BoardReceptor, parse_adc, read_calibration};
-use stretch_core::{Branch, Calibration, RateEstimator, Runner, Volts};
+use stretch_calibrate::{BoardReceptor, converter_reach, parse_adc, read_calibration};
+use stretch_core::{Branch, Calibration, Interval, RateEstimator, Runner, Volts};
 use stretch_data::files::is_standard_output;
 use stretch_link::{Answer, Decoder, Event, TimeLine};
 use stretch_receptor::{
@@ -63,13 +63,16 @@ pub(crate) struct Args {
     #[arg(long, value_name = "trial.csv|-")]
     out: Option<PathBuf>,
     /// The board's converter: bits, and the signal at code 0 and at the last code
-    #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO_V,FULL_SCALE_V",
+    ///
+    /// ZERO and FULL_SCALE are in the unit of the signal column: volts such as 12,0,3.3, or counts such
+    /// as 10,0,1023 for a column of codes.
+    #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO,FULL_SCALE",
           value_parser = parse_adc)]
     adc: Adc,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let twin = Twin::read(&args.calibration, args.adc.spec().bits)?;
+    let twin = Twin::read(&args.calibration, &args.adc)?;
     let (shown_port, baud) = path_and_speed(&args.port);
     let heard = port::listen(Path::new(shown_port), baud).with_context(|| shown_port.to_owned())?;
     let header = trial_file::header(&twin);
@@ -262,14 +265,21 @@ enum Own {
 
 impl Twin {
     /// Reads a file of `stretch calibrate` or of `stretch export --fixed`.
-    pub(super) fn read(path: &Path, adc_bits: u8) -> anyhow::Result<Self> {
+    pub(super) fn read(path: &Path, adc: &Adc) -> anyhow::Result<Self> {
         let Some(receptor) = BoardReceptor::read(path) else {
-            return Self::of(&read_calibration(path)?);
+            let calibration = read_calibration(path)?;
+            let (spec, range) = (calibration.spec(), calibration.spec().signal_range);
+            let range = Interval { min: range.min(), max: range.max() };
+            let note = converter_reach(&spec.signal, range, adc);
+            if let Some(note) = note.with_context(|| path.display().to_string())? {
+                warn(format!("note: {note}"));
+            }
+            return Self::of(&calibration);
         };
         let bits = receptor.adc_bits();
         anyhow::ensure!(
-            bits == adc_bits,
-            "{}: this calibration file is for a converter of {bits} bits; give --adc {bits},ZERO_V,FULL_SCALE_V",
+            bits == adc.spec().bits,
+            "{}: this calibration file is for a converter of {bits} bits; give --adc {bits},ZERO,FULL_SCALE",
             path.display()
         );
         Ok(Self {

@@ -5,7 +5,10 @@ use stretch_filter::FilterError;
 use stretch_fit::FitError;
 use stretch_receptor::ReceptorError;
 
-use crate::FIXED_STEP;
+use crate::{
+    FIXED_STEP,
+    record::{GIVE_ADC, short},
+};
 
 /// Error of a fit to trials, or of the use of a calibration.
 #[derive(Debug, thiserror::Error)]
@@ -144,7 +147,7 @@ pub enum CalibrateError {
     /// The converter has too many bits for 32-bit integer arithmetic.
     #[error(
         "codes of a converter of {bits} bits are too large for 32-bit integers: export in float (stretch export --c DIR --form float), or \
-         give the board the upper 16 bits of each code (--adc 16,ZERO_V,FULL_SCALE_V)"
+         give the board the upper 16 bits of each code (--adc 16,ZERO,FULL_SCALE)"
     )]
     FixedBits {
         /// Bits of the converter.
@@ -175,10 +178,14 @@ pub enum CalibrateError {
     },
     /// All of the signal lies outside the converter's range.
     #[error(
-        "the signal of the trials is between {min} and {max}, but the converter measures from {zero_v} to {full_scale_v}; \
-         give the converter of the board with --adc, in the unit of the signal"
+        "the signal {signal} of the trials is between {} and {}, but the converter measures from {zero_v} to {full_scale_v}: this is not \
+         the board's converter; {GIVE_ADC}",
+        short(*.min),
+        short(*.max)
     )]
     OutsideConverter {
+        /// Column of the signal.
+        signal: Label,
         /// The least signal of the trials.
         min: f64,
         /// The greatest signal of the trials.

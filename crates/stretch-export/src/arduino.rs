@@ -1,6 +1,6 @@
 //! A header packed as a library for the Arduino IDE.
 
-use crate::{Form, Header, part::kept};
+use crate::{ExportError, Form, Header, part::kept};
 
 /// A file of a library folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,24 +20,28 @@ pub struct File {
 /// Characters that a name may not have become `_`. Copy the folder into the `libraries` folder of the sketchbook.
 /// Source: Arduino library specification, revision 2.2 (format 1.5).
 ///
+/// # Errors
+/// [`ExportError::Converter`] if the board's converter measures no part of a calibrated range.
+///
 /// ```
 /// use stretch_calibrate::parse_adc;
 /// use stretch_export::{Options, arduino_library, header};
 /// let options = Options { form: None, adc: parse_adc("12,0,3.3")? };
 /// let header = header(&stretch_receptor::example_calibration(), &options)?;
-/// let paths: Vec<_> = arduino_library(&header, "Elbow").into_iter().map(|file| file.path).collect();
+/// let paths: Vec<_> = arduino_library(&header, "Elbow")?.into_iter().map(|file| file.path).collect();
 /// assert_eq!(paths, ["library.properties", "keywords.txt", "src/stretch_Elbow.h", "examples/Live/Live.ino"]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
-pub fn arduino_library(header: &Header, name: &str) -> Vec<File> {
+pub fn arduino_library(header: &Header, name: &str) -> Result<Vec<File>, ExportError> {
+    header.converter_notes()?;
     let name = allowed(name);
     let file = |path: &str, text: String| File { path: path.into(), text };
-    vec![
+    Ok(vec![
         file("library.properties", properties(header, &name)),
         file("keywords.txt", keywords(header)),
         file(&format!("src/stretch_{name}.h"), header.text.clone()),
         file("examples/Live/Live.ino", live(header, &name)),
-    ]
+    ])
 }
 
 /// Changes a name to one that the specification allows: at most 63 letters, digits and `_.-`, with a letter, and a

@@ -19,8 +19,11 @@ pub enum ExportError {
         model: String,
     },
     /// An integer form was requested, but this model has none.
-    #[error("{0}; or export in --form float, which needs no converter")]
+    #[error("{0}; or export in --form float, which takes the signal instead of a code")]
     NoFixedForm(#[source] CalibrateError),
+    /// The codes of the converter stand for a signal outside the calibrated range.
+    #[error(transparent)]
+    Converter(CalibrateError),
     /// Integers were requested for several gauges.
     #[error(
         "several gauges cannot be exported in integers: leave out --form, or give --form float"

@@ -3,13 +3,14 @@
 use std::{fmt, str::FromStr};
 
 use stretch_calibrate::{
-    CalibrateError, FIXED_STEP, RecordNumbers, SpellingError, calibration_seal, fixed_record,
+    CalibrateError, FIXED_STEP, RecordNumbers, SpellingError, calibration_seal, converter_reach,
+    fixed_record,
 };
 use stretch_core::{
-    Branch, Calibration, Label, Model, Provenance, SampleRate, Target, record::checksum,
+    Branch, Calibration, Interval, Label, Model, Provenance, SampleRate, Target, record::checksum,
 };
 use stretch_receptor::code::Adc;
-use stretch_sleeve::{ArrayCalibration, GaugeCalibration, Turns, array_seal};
+use stretch_sleeve::{ArrayCalibration, ArrayChannel, GaugeCalibration, Turns, array_seal};
 
 use crate::{
     ExportError,
@@ -68,7 +69,7 @@ pub struct Options {
 }
 
 /// A calibration as a C header.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Header {
     /// The text of [`HEADER`].
     pub text: String,
@@ -85,6 +86,24 @@ pub struct Header {
     /// Names of the two directions of motion: `inflation` and `deflation` for a contraction, otherwise `rising` and
     /// `falling`.
     pub branches: [&'static str; 2],
+    /// The signals of a step, with their calibrated ranges.
+    pub signals: Vec<(Label, Interval)>,
+    /// The board's converter.
+    pub adc: Adc,
+}
+
+impl Header {
+    /// Compares the calibrated ranges of the signals with the range of the board's converter. Returns notes, as
+    /// [`converter_reach`] does.
+    ///
+    /// # Errors
+    /// [`ExportError::Converter`] if the converter measures no part of a range.
+    pub fn converter_notes(&self) -> Result<Vec<String>, ExportError> {
+        let notes =
+            self.signals.iter().map(|(signal, range)| converter_reach(signal, *range, &self.adc));
+        let notes: Result<Vec<_>, _> = notes.collect();
+        Ok(notes.map_err(ExportError::Converter)?.into_iter().flatten().collect())
+    }
 }
 
 /// Writes a calibration as a C99 header that also compiles as C++11.
@@ -141,7 +160,10 @@ fn one(
 }
 
 fn fixed(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
-    let record = fixed_record(calibration, &options.adc).map_err(ExportError::NoFixedForm)?;
+    let record = fixed_record(calibration, &options.adc).map_err(|error| match error {
+        CalibrateError::OutsideConverter { .. } => ExportError::Converter(error),
+        _ => ExportError::NoFixedForm(error),
+    })?;
     let part = match &record.numbers {
         RecordNumbers::Rated(numbers) => surfaces_fixed(numbers),
         RecordNumbers::Observer(numbers) => observer_fixed(numbers),
@@ -149,7 +171,7 @@ fn fixed(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
     let test = self_test::fixed(calibration, &options.adc, &record)?;
     // the bytes were just stored, so they have a seal (checksum)
     let seal = stretch_core::record::seal(&record.bytes).ok().flatten().unwrap_or_default();
-    Ok(assembled(&Source::of(calibration, seal), options, Form::Fixed, part, &test))
+    Ok(assembled(Source::of(calibration, seal), options, Form::Fixed, part, &test))
 }
 
 fn float(
@@ -174,7 +196,7 @@ fn float(
     }
     let test = self_test::float(calibration)?;
     let seal = calibration_seal(calibration).map_err(ExportError::NoRecord)?;
-    Ok(assembled(&Source::of(calibration, seal), options, Form::Float, part, &test))
+    Ok(assembled(Source::of(calibration, seal), options, Form::Float, part, &test))
 }
 
 /// Writes a calibration of several gauges as a header in `float`, like that of [`header`]. A step takes one sample of
@@ -200,9 +222,10 @@ pub fn array_header<const N: usize>(
     if options.form == Some(Form::Fixed) {
         return Err(ExportError::FixedArray);
     }
-    let names: Vec<&str> = calibration.spec().channels.iter().map(|c| c.signal.as_str()).collect();
+    let signals: Vec<_> = calibration.spec().channels.iter().map(range_of).collect();
+    let channels = signals.len();
     let source = Source {
-        signal: names.join(", "),
+        signals,
         reference: &calibration.spec().reference,
         sample_rate: calibration.spec().sample_rate_hz,
         provenance: &calibration.spec().provenance,
@@ -210,18 +233,25 @@ pub fn array_header<const N: usize>(
         target: Target::Direct,
     };
     let made = assembled(
-        &source,
+        source,
         options,
         Form::Float,
         array_float(calibration),
         &self_test::array(calibration)?,
     );
-    Ok(Header { array: Some(names.len()), ..made })
+    Ok(Header { array: Some(channels), ..made })
+}
+
+/// Returns the signal of a gauge and its calibrated range, which is that of the first state.
+fn range_of<const N: usize>(channel: &ArrayChannel<N>) -> (Label, Interval) {
+    let ends = channel.state_min.iter().zip(channel.state_max.iter()).next();
+    let range = ends.map_or(channel.possible, |(&min, &max)| Interval { min, max });
+    (channel.signal.clone(), range)
 }
 
 /// The facts about a calibration that its header states.
 struct Source<'a> {
-    signal: String,
+    signals: Vec<(Label, Interval)>,
     reference: &'a Label,
     sample_rate: SampleRate,
     provenance: &'a Provenance,
@@ -231,8 +261,10 @@ struct Source<'a> {
 
 impl<'a> Source<'a> {
     fn of(calibration: &'a Calibration, seal: u32) -> Self {
+        let range = calibration.spec().signal_range;
+        let range = Interval { min: range.min(), max: range.max() };
         Self {
-            signal: calibration.spec().signal.as_str().to_owned(),
+            signals: vec![(calibration.spec().signal.clone(), range)],
             reference: &calibration.spec().reference,
             sample_rate: calibration.spec().sample_rate_hz,
             provenance: &calibration.spec().provenance,
@@ -253,7 +285,7 @@ impl Source<'_> {
 
 /// Joins the parts of a header in order.
 fn assembled(
-    source: &Source<'_>,
+    source: Source<'_>,
     options: &Options,
     form: Form,
     part: Part,
@@ -262,7 +294,7 @@ fn assembled(
     let Part { model, constants, step, has } = part;
     let pressure = has.contains(&"crosstalk");
     let has_branches = !has.contains(&"array");
-    let mut text = opening(source, form, &model, &has) + &frame(source, options);
+    let mut text = opening(&source, form, &model, &has) + &frame(&source, options);
     text += "\n";
     text += include_str!("c/flash.h");
     text += "\n/* ---- the calibration ---- */\n\n";
@@ -294,12 +326,15 @@ fn assembled(
     let id = format!("0x{:08x}u", checksum(text.as_bytes()));
     let text = text.replace("@ID@", &id);
     let branches = [Branch::Inflation, Branch::Deflation].map(|b| source.target.branch_name(b));
-    Header { text, form, model, pressure, array: None, step: source.step(form), branches }
+    let (step, adc) = (source.step(form), options.adc);
+    let signals = source.signals;
+    Header { text, form, model, pressure, array: None, step, branches, signals, adc }
 }
 
 /// Returns the opening comment, which describes the file to its readers.
 fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String {
-    let signal = comment_safe(&source.signal);
+    let names: Vec<&str> = source.signals.iter().map(|(signal, _)| signal.as_str()).collect();
+    let signal = comment_safe(&names.join(", "));
     let reference = comment_safe(source.reference.as_str());
     let (taken, given) = match form {
         Form::Fixed => ("a code of the converter", format!("thousandths of {reference}'s unit")),

@@ -311,7 +311,7 @@ fn with_avr_gcc_two_gauges_on_an_uno_give_the_same_bits() {
 #[test]
 fn the_arduino_example_reads_a_pin_a_gauge() {
     let made = array_header(&example_array(), &options(None)).unwrap();
-    let library = arduino_library(&made, "Elbow");
+    let library = arduino_library(&made, "Elbow").unwrap();
     let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
     assert!(live.text.contains("pins[STRETCH_CHANNELS] = {A0, A1};"), "{}", live.text);
     let words = &library.iter().find(|file| file.path == "keywords.txt").unwrap().text;
@@ -332,7 +332,7 @@ fn an_arduino_library_has_the_name_of_its_folder_as_far_as_it_may() {
         ("", "stretch"),
         ("Ellbögen", "Ellb_gen"),
     ] {
-        let library = arduino_library(&made, folder);
+        let library = arduino_library(&made, folder).unwrap();
         let text = |end: &str| {
             let file = library.iter().find(|file| file.path.ends_with(end));
             &file.unwrap_or_else(|| panic!("{folder}: no {end}")).text
@@ -344,7 +344,7 @@ fn an_arduino_library_has_the_name_of_its_folder_as_far_as_it_may() {
         assert!(text("Live.ino").contains(&format!("#include <stretch_{name}.h>\n")), "{name}");
     }
     for (length, kept) in [(60, 60), (63, 63), (300, 63)] {
-        let long = arduino_library(&made, &"x".repeat(length));
+        let long = arduino_library(&made, &"x".repeat(length)).unwrap();
         let name = format!("name={}", "x".repeat(kept));
         assert_eq!(long[0].text.lines().next(), Some(&*name), "{length}");
     }

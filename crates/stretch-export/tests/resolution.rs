@@ -67,7 +67,7 @@ fn a_period_is_never_stated_as_zero() -> Result<(), ExportError> {
             }
             None => assert!(!made.text.contains("STRETCH_PERIOD_US"), "{hz}"),
         }
-        let library = arduino_library(&made, "Elbow");
+        let library = arduino_library(&made, "Elbow")?;
         let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
         assert!(live.text.contains("#if !defined(STRETCH_PERIOD_US)\n#error"), "{hz}");
     }

@@ -511,7 +511,7 @@ fn a_header_has_the_defects_that_its_map_has() {
         let made = header(&calibration, &options).unwrap();
         assert_eq!(made.form, Form::Float, "{name}");
         assert!(!made.text.contains('@'), "{name}: a mark was left");
-        let library = arduino_library(&made, "Elbow");
+        let library = arduino_library(&made, "Elbow").unwrap();
         let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
         assert_eq!(live.text.contains("stretch_set_pressure("), made.pressure, "{name}");
         (made.pressure, made.text)
@@ -550,7 +550,7 @@ fn a_second_header_in_a_file_is_an_error_that_says_what_to_do() {
         (of(&elbow, Form::Float, "10,0,5"), false),
     ];
     for (other, is_same) in others {
-        let library = arduino_library(&other, "Knee");
+        let library = arduino_library(&other, "Knee").unwrap();
         let text = &library.iter().find(|file| file.path == "src/stretch_Knee.h").unwrap().text;
         fs::write(folder.path().join("stretch_Knee.h"), text).unwrap();
         let main = "#include \"first.h\"\n#include \"stretch_Knee.h\"\n\

@@ -3,7 +3,9 @@
 use std::{fmt, path::Path};
 
 use serde::Serialize;
-use stretch_core::{Calibration, DesignError, Model, RateEstimator, Runner, Stage, record};
+use stretch_core::{
+    Calibration, DesignError, Interval, Label, Model, RateEstimator, Runner, Stage, record,
+};
 use stretch_receptor::{
     ReceptorError, Withheld,
     code::{
@@ -39,6 +41,8 @@ pub struct FixedRecord {
     pub read_as: String,
     /// The numbers that the bytes hold.
     pub numbers: RecordNumbers,
+    /// The note of [`converter_reach`].
+    pub note: Option<String>,
 }
 
 /// Returns a calibration in integers. Its inputs are codes of `adc`, its outputs thousandths of the reference's unit.
@@ -66,11 +70,9 @@ pub struct FixedRecord {
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord, CalibrateError> {
-    let (min, max) = (calibration.spec().signal_range.min(), calibration.spec().signal_range.max());
-    let AdcSpec { zero_v, full_scale_v, .. } = adc.spec();
-    if max < zero_v || full_scale_v < min {
-        return Err(CalibrateError::OutsideConverter { min, max, zero_v, full_scale_v });
-    }
+    let spec = calibration.spec();
+    let range = Interval { min: spec.signal_range.min(), max: spec.signal_range.max() };
+    let note = converter_reach(&spec.signal, range, adc)?;
     let bits = adc.spec().bits;
     if bits > FIXED_BITS {
         return Err(CalibrateError::FixedBits { bits });
@@ -92,10 +94,67 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
         return Err(too_coarse(calibration));
     }
     if !matches!(calibration.spec().model, Model::Observer(_)) {
-        return rated(calibration, adc);
+        return Ok(FixedRecord { note, ..rated(calibration, adc)? });
     }
     let fixed = FixedObserver::new(calibration, adc).map_err(CalibrateError::Fixed)?;
-    made("FixedObserver".into(), &fixed, RecordNumbers::Observer(*fixed.model()))
+    let made = made("FixedObserver".into(), &fixed, RecordNumbers::Observer(*fixed.model()))?;
+    Ok(FixedRecord { note, ..made })
+}
+
+/// Compares the calibrated range of a signal with the range that a converter measures. Returns a note if the converter
+/// measures only a part of it, or measures it in few codes.
+///
+/// # Errors
+/// [`CalibrateError::OutsideConverter`] if the converter measures no part of it.
+///
+/// ```
+/// use stretch_calibrate::{converter_reach, parse_adc};
+/// use stretch_core::{Interval, Label};
+///
+/// let (signal, counts) = (Label::new("a0")?, Interval { min: 193.0, max: 456.0 });
+/// let reach = |adc| converter_reach(&signal, counts, &parse_adc(adc).unwrap());
+/// assert_eq!(reach("10,0,1023")?, None);
+/// assert!(reach("10,0,400")?.is_some_and(|note| note.contains("is from 193 to 456")));
+/// assert!(reach("10,0,5").unwrap_err().to_string().contains("--adc"));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn converter_reach(
+    signal: &Label,
+    range: Interval,
+    adc: &Adc,
+) -> Result<Option<String>, CalibrateError> {
+    let Interval { min, max } = range;
+    let AdcSpec { zero_v, full_scale_v, .. } = adc.spec();
+    if max < zero_v || full_scale_v < min {
+        let signal = signal.clone();
+        return Err(CalibrateError::OutsideConverter { signal, min, max, zero_v, full_scale_v });
+    }
+    // a hundredth of the range is not worth a note
+    let beyond = (zero_v - min).max(max - full_scale_v) > 0.01 * (max - min);
+    let codes = (max - min) / adc.volts_per_code();
+    let what = match (beyond, codes < FEW_CODES) {
+        (true, _) => "which is only a part of that range".to_owned(),
+        (false, true) => format!("in which that range has only {codes:.1} codes"),
+        (false, false) => return Ok(None),
+    };
+    Ok(Some(format!(
+        "the calibrated range of {signal} is from {} to {}, and the converter measures from {zero_v} to {full_scale_v}, {what}; if this is \
+         not the board's converter, {GIVE_ADC}",
+        short(min),
+        short(max)
+    )))
+}
+
+/// A calibrated range with fewer codes than this is measured too coarsely.
+const FEW_CODES: f64 = 16.0;
+
+/// What to do about a converter that does not fit the signal.
+pub(crate) const GIVE_ADC: &str = "give it with --adc BITS,ZERO,FULL_SCALE in the unit of the signal column, \
+                                   such as 12,0,3.3 for volts or 10,0,1023 for counts of 10 bits";
+
+/// Rounds a number to six digits, for a message.
+pub(crate) fn short(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
 }
 
 fn too_coarse(calibration: &Calibration) -> CalibrateError {
@@ -188,7 +247,7 @@ fn made<T: Serialize>(
     // The buffer has room for every number, so this cannot fail.
     let bytes = record::store(fixed, &mut buffer);
     let bytes = bytes.map_err(|error| CalibrateError::Fixed(error.into()))?;
-    Ok(FixedRecord { bytes: bytes.to_vec(), read_as, numbers })
+    Ok(FixedRecord { bytes: bytes.to_vec(), read_as, numbers, note: None })
 }
 
 /// The receptor of a file from `stretch export --fixed`. It gives the same bits here as on the board.
@@ -273,7 +332,7 @@ where
     }
 }
 
-const CONVERTER: &str = "BITS,ZERO_V,FULL_SCALE_V such as 12,0,3.3: 1 to 24 bits, the signal at \
+const CONVERTER: &str = "BITS,ZERO,FULL_SCALE such as 12,0,3.3: 1 to 24 bits, the signal at \
                          code 0, and a larger one at the last code";
 
 /// Parses a converter: its bits, the signal at code 0 and the signal at the last code.

@@ -10,5 +10,7 @@ pub use file::{
     calibration_to_json, is_postcard, read_calibration, write_calibration,
 };
 pub use fixed::{
-    BoardReceptor, FIXED_STEP, FixedRecord, RecordNumbers, fit_error, fixed_record, parse_adc,
+    BoardReceptor, FIXED_STEP, FixedRecord, RecordNumbers, converter_reach, fit_error,
+    fixed_record, parse_adc,
 };
+pub(crate) use fixed::{GIVE_ADC, short};

@@ -1,9 +1,9 @@
 //! A band-limited differentiator.
 
 use crate::low_pass::noise_power;
-use crate::{Biquad, BiquadMemory, Cost, LowPassSpec, sample};
+use crate::{Biquad, BiquadMemory, Cost, LowPassSpec, NamedRate, sample};
 use core::f64::consts::SQRT_2;
-use stretch_core::{Design, DesignError, Real, Stage};
+use stretch_core::{Design, DesignError, RateEstimator, Real, SampleRate, Stage};
 
 /// Estimator of a signal's rate: a first difference in series with a second-order Butterworth
 /// low-pass filter.
@@ -105,6 +105,13 @@ impl<T: Real> Design for Differentiator<T> {
             started: false,
             remaining: self.warm_up,
         }
+    }
+}
+
+impl<T: Real> NamedRate for Differentiator<T> {
+    fn named(&self) -> Option<(RateEstimator, SampleRate)> {
+        let LowPassSpec { cutoff, sample_rate } = self.spec;
+        Some((RateEstimator::Differentiator { cutoff_hz: cutoff.0 }, sample_rate))
     }
 }
 

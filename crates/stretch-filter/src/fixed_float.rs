@@ -1,7 +1,7 @@
 //! A Savitzky-Golay rate estimator for `f32` samples on a core without a floating-point unit.
 
-use crate::{FixedSgMemory, FixedSgRate, LARGEST_SAMPLE, sample};
-use stretch_core::{Design, DesignError, SampleRate, Stage};
+use crate::{FixedSgMemory, FixedSgRate, LARGEST_SAMPLE, NamedRate, named::savitzky_golay, sample};
+use stretch_core::{Design, DesignError, RateEstimator, SampleRate, Stage};
 
 /// Estimator of the rate of an `f32` signal with integer sums: a [`FixedSgRate`] with conversions
 /// before and after it.
@@ -35,6 +35,7 @@ pub struct IntegerSgRate<const WINDOW: usize, const DEGREE: usize, const DELAY: 
     fraction_bits: i32,
     /// Factor from the output of `sums` to the sample's unit per second.
     per_second: f32,
+    sample_rate: SampleRate,
 }
 
 impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
@@ -55,7 +56,8 @@ impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
         let fraction_bits = 31 - exponent;
         let per_sample = FixedSgRate::<i32, WINDOW, DEGREE, DELAY>::PER_SAMPLE;
         let per_second = libm::ldexp(per_sample * sample_rate.hz(), -fraction_bits);
-        Ok(Self { sums: FixedSgRate::new(), fraction_bits, per_second: per_second as f32 })
+        let per_second = per_second as f32;
+        Ok(Self { sums: FixedSgRate::new(), fraction_bits, per_second, sample_rate })
     }
 
     /// Returns `x 2^fraction_bits`, rounded and saturated, without a floating-point operation.
@@ -91,6 +93,14 @@ impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Design
 
     fn memory(&self) -> Self::Memory {
         self.sums.memory()
+    }
+}
+
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize> NamedRate
+    for IntegerSgRate<WINDOW, DEGREE, DELAY>
+{
+    fn named(&self) -> Option<(RateEstimator, SampleRate)> {
+        savitzky_golay(WINDOW, DEGREE, DELAY, self.sample_rate)
     }
 }
 

@@ -18,6 +18,7 @@ mod fixed_taps;
 mod gram;
 pub mod log;
 mod low_pass;
+mod named;
 mod rate_filter;
 mod sample;
 mod savgol;
@@ -37,6 +38,7 @@ pub use fixed_savgol::{FixedSample, FixedSgIntegers, FixedSgMemory, FixedSgRate}
 pub use fixed_taps::MAX_FIXED_SG_DEGREE;
 pub use gram::MAX_SG_DEGREE;
 pub use low_pass::{LowPass, LowPassMemory, LowPassSpec, MAX_ORDER};
+pub use named::NamedRate;
 pub use rate_filter::{RateFilter, RateMemory};
 pub use sample::{LARGEST_SAMPLE, MAX_SAMPLE_RATE_HZ, MIN_SAMPLE_RATE_HZ};
 pub use savgol::{SavitzkyGolay, SgMemory, SgRate, SgSmooth};

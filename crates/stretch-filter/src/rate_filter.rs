@@ -1,8 +1,8 @@
 //! The live rate estimator that a calibration file specifies.
 
 use crate::{
-    Cost, Differentiator, DifferentiatorMemory, FilterError, LowPassSpec, SgFilter, SgMemory,
-    SgShape, Tracker, TrackerMemory, TrackerSpec,
+    Cost, Differentiator, DifferentiatorMemory, FilterError, LowPassSpec, NamedRate, SgFilter,
+    SgMemory, SgShape, Tracker, TrackerMemory, TrackerSpec,
 };
 use stretch_core::{Design, Hertz, RateEstimator, Real, SampleRate, Stage};
 
@@ -30,6 +30,7 @@ use stretch_core::{Design, Hertz, RateEstimator, Real, SampleRate, Stage};
 pub struct RateFilter<T, const CAP: usize = 64> {
     kind: Kind<T, CAP>,
     estimator: RateEstimator,
+    sample_rate: SampleRate,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,7 +94,7 @@ impl<T: Real, const CAP: usize> RateFilter<T, CAP> {
             // The central difference, and estimators that a later version may add.
             _ => return Err(FilterError::LooksAhead { samples: 1 }),
         };
-        Ok(Self { kind, estimator })
+        Ok(Self { kind, estimator, sample_rate })
     }
 
     /// Returns the parameters from which the design was built.
@@ -143,6 +144,12 @@ impl<T: Real, const CAP: usize> Design for RateFilter<T, CAP> {
             Kind::Differentiator(design) => Inner::Differentiator(design.memory()),
             Kind::Tracker(design) => Inner::Tracker(design.memory()),
         })
+    }
+}
+
+impl<T: Real, const CAP: usize> NamedRate for RateFilter<T, CAP> {
+    fn named(&self) -> Option<(RateEstimator, SampleRate)> {
+        Some((self.estimator, self.sample_rate))
     }
 }
 

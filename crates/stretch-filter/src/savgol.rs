@@ -1,7 +1,7 @@
 //! Causal Savitzky-Golay filters whose shape is part of the type.
 
-use crate::{Cost, MAX_SG_DEGREE, fir, gram, sample};
-use stretch_core::{Design, DesignError, Real, SampleRate, Stage};
+use crate::{Cost, MAX_SG_DEGREE, NamedRate, fir, gram, named::savitzky_golay, sample};
+use stretch_core::{Design, DesignError, RateEstimator, Real, SampleRate, Stage};
 
 /// Causal Savitzky-Golay filter: the `ORDER`-th derivative of the least-squares polynomial of
 /// degree `DEGREE` through the newest `WINDOW` samples, evaluated `DELAY` samples before the
@@ -204,6 +204,15 @@ impl<T: Real, const ORDER: usize, const WINDOW: usize, const DEGREE: usize, cons
 
     fn memory(&self) -> SgMemory<T, WINDOW> {
         SgMemory::empty(WINDOW - 1)
+    }
+}
+
+/// Only the first derivative is a rate.
+impl<T: Real, const ORDER: usize, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    NamedRate for SavitzkyGolay<T, ORDER, WINDOW, DEGREE, DELAY>
+{
+    fn named(&self) -> Option<(RateEstimator, SampleRate)> {
+        savitzky_golay(WINDOW, DEGREE, DELAY, self.sample_rate).filter(|_| ORDER == 1)
     }
 }
 

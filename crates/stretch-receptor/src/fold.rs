@@ -1,7 +1,7 @@
 //! Numbers that every receptor derives from a calibration.
 
 use stretch_core::{Calibration, Range, Real};
-use stretch_filter::RateFilter;
+use stretch_filter::{NamedRate, RateFilter};
 
 use crate::ReceptorError;
 
@@ -23,6 +23,18 @@ pub(crate) fn estimator<T: Real>(
     calibration: &Calibration,
 ) -> Result<RateFilter<T>, ReceptorError> {
     Ok(RateFilter::new(calibration.spec().rate_estimator, calibration.spec().sample_rate_hz)?)
+}
+
+/// Refuses a rate estimator that is not the one with which the calibration was fitted.
+pub(crate) fn check_rate(
+    calibration: &Calibration,
+    rate: &impl NamedRate,
+) -> Result<(), ReceptorError> {
+    let fitted = (calibration.spec().rate_estimator, calibration.spec().sample_rate_hz);
+    match rate.named() {
+        Some(given) if given != fitted => Err(ReceptorError::Rate { fitted, given }),
+        _ => Ok(()),
+    }
 }
 
 /// Converts values to the receptor's precision, and fills up with zeros.

@@ -5,11 +5,11 @@ use stretch_core::{
     MAX_RELAXATIONS, MAX_STATES, Model, Real, RestLevel, Stage,
     arithmetic::{lag, lag_share, play},
 };
-use stretch_filter::RateFilter;
+use stretch_filter::{NamedRate, RateFilter};
 
 use crate::{
     Domain, Front, Reading, ReceptorError,
-    fold::{estimator, output, reference_dead_band, rounded},
+    fold::{check_rate, estimator, output, reference_dead_band, rounded},
     front::{Direction, Live, over_volts},
 };
 
@@ -79,8 +79,12 @@ impl<T: Real, R> HistoryReceptor<T, R> {
     /// A receptor for `calibration`, with a rate estimator for the estimate.
     ///
     /// # Errors
-    /// [`ReceptorError`] when the calibration is of another model.
-    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError> {
+    /// As [`StretchReceptor::with_rate`](crate::StretchReceptor::with_rate).
+    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError>
+    where
+        R: NamedRate,
+    {
+        check_rate(calibration, &rate)?;
         let Model::History(map) = &calibration.spec().model else {
             return Err(calibration.spec().model.instead_of("history").into());
         };

@@ -1,7 +1,7 @@
 //! A receptor for any model that a calibration can hold.
 
 use stretch_core::{Branch, Calibration, Design, Model, Real, Stage};
-use stretch_filter::RateFilter;
+use stretch_filter::{NamedRate, RateFilter};
 
 use crate::{
     DiagnosedReceptor, Front, HistoryReceptor, ObserverReceptor, Reading, ReceptorError,
@@ -75,8 +75,11 @@ impl<T: Real, R> Receptor<T, R> {
     /// A receptor for `calibration`, with a rate estimator built for it.
     ///
     /// # Errors
-    /// [`ReceptorError`] when a coefficient leaves the range of `T`.
-    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError> {
+    /// As [`StretchReceptor::with_rate`]. Models without a rate estimator do not use `rate`.
+    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError>
+    where
+        R: NamedRate,
+    {
         let model = match &calibration.spec().model {
             Model::History(_) => {
                 AnyModel::History(HistoryReceptor::with_rate(calibration, rate)?.model)

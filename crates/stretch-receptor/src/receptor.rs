@@ -1,11 +1,11 @@
 //! The live form of lines and surfaces: a signal in, a reading out, one sample at a time.
 
 use stretch_core::{Branch, Calibration, Design, Real, Stage};
-use stretch_filter::RateFilter;
+use stretch_filter::{NamedRate, RateFilter};
 
 use crate::{
     Front, Reading, ReceptorError,
-    fold::estimator,
+    fold::{check_rate, estimator},
     front::{Direction, Live, over_volts},
     map::{Map, Point},
 };
@@ -108,9 +108,14 @@ impl<T: Real, R> StretchReceptor<T, R> {
     /// [`CalibrationSpec::rate_estimator`]: stretch_core::CalibrationSpec::rate_estimator
     ///
     /// # Errors
-    /// [`ReceptorError`] when the calibration is of another model or a coefficient
-    /// leaves the range of `T`.
-    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError> {
+    /// [`ReceptorError::Rate`] for another estimator or sample rate (an `R` without a [name](NamedRate) is not
+    /// compared), or [`ReceptorError`] when the calibration is of another model or a coefficient leaves the range of
+    /// `T`.
+    pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError>
+    where
+        R: NamedRate,
+    {
+        check_rate(calibration, &rate)?;
         let direction =
             Direction::of_signal(calibration.spec().polarity, calibration.spec().dead_band);
         let model = Surfaces {

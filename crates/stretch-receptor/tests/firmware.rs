@@ -10,7 +10,7 @@ use stretch_core::{
     HistoryShape, Interval, LinearMap, Model, ObserverMap, RateEstimator, RestTracker, SampleRate,
     Stage, Values, Volts,
 };
-use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, RateFilter, SgRate};
+use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, NamedRate, RateFilter, SgRate};
 use stretch_receptor::{
     DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading, StretchReceptor, Withheld,
     code::{
@@ -100,7 +100,10 @@ where
     format!("{:08x}", checksum.0)
 }
 
-fn volts<R: Stage<f32, Out = Option<f32>>>(calibration: &Calibration, rate: R) -> String {
+fn volts<R: Stage<f32, Out = Option<f32>> + NamedRate>(
+    calibration: &Calibration,
+    rate: R,
+) -> String {
     volts_of(StretchReceptor::with_rate(calibration, rate).unwrap())
 }
 
@@ -119,6 +122,12 @@ where
         checksum.answer(answer);
     }
     format!("{:08x}", checksum.0)
+}
+
+/// Returns a calibration that names another estimator than that of its fit, to compute with that one.
+fn named(calibration: &Calibration, rate_estimator: RateEstimator) -> Calibration {
+    let spec = CalibrationSpec { rate_estimator, ..calibration.clone().into_spec() };
+    Calibration::new(spec).unwrap()
 }
 
 fn with(model: Model) -> Calibration {
@@ -222,6 +231,7 @@ fn the_golden_checksums_are_these() {
     let low_pass = LowPassSpec { cutoff: Hertz(5.0), sample_rate: hz };
     let tracker = RateEstimator::Tracker { tracking_index: 0.1 };
     let sg = SgRate::<f32, 11, 2>::new(hz).unwrap();
+    let differentiated = named(&poly13, RateEstimator::Differentiator { cutoff_hz: 5.0 });
     let golden = [
         ("poly13-fixed", codes::<Fixed>(&poly13)),
         ("linear-fixed", codes::<Fixed>(&linear)),
@@ -230,8 +240,14 @@ fn the_golden_checksums_are_these() {
         ("poly13-f32-volts", volts(&poly13, sg)),
         ("linear-f32-volts", volts(&linear, sg)),
         ("poly13-f32-volts-integer", volts(&poly13, IntegerSgRate::<11, 2>::new(hz, 3.3).unwrap())),
-        ("poly13-f32-differentiator", volts(&poly13, Differentiator::new(low_pass).unwrap())),
-        ("poly13-f32-tracker", volts(&poly13, RateFilter::<f32>::new(tracker, hz).unwrap())),
+        (
+            "poly13-f32-differentiator",
+            volts(&differentiated, Differentiator::new(low_pass).unwrap()),
+        ),
+        (
+            "poly13-f32-tracker",
+            volts(&named(&poly13, tracker), RateFilter::<f32>::new(tracker, hz).unwrap()),
+        ),
     ];
     let mut text = String::from("# made by the test `firmware` of stretch-receptor on a host\n");
     let mut golden: Vec<(String, String)> =

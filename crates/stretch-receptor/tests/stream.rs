@@ -3,12 +3,13 @@
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::prelude::*;
 use stretch_core::{
-    Branch, Calibration, Degree, Design, Model, Polarity, Runner, SampleRate, Stage, Surface,
-    Volts, strategies::paper_calibration,
+    Branch, Calibration, Degree, Design, Model, Polarity, RateEstimator, Runner, SampleRate, Stage,
+    Surface, Volts, strategies::paper_calibration,
 };
-use stretch_filter::{RateFilter, SgRate};
+use stretch_filter::{IntegerSgRate, RateFilter, SgRate};
 use stretch_receptor::{
-    Domain, MAX_BRIDGED, Reading, StretchReceptor, Withheld, example_calibration, strategies,
+    Domain, MAX_BRIDGED, Reading, Receptor, ReceptorError, StretchReceptor, Withheld,
+    example_calibration, strategies,
 };
 use testkit::tolerance;
 
@@ -246,4 +247,36 @@ fn the_memory_of_a_channel_is_as_documented() {
     type Fixed<T> = StretchReceptor<T, SgRate<T, 11, 2>>;
     assert_eq!(size_of::<<Fixed<f64> as Design>::Memory>(), 120);
     assert_eq!(size_of::<<Fixed<f32> as Design>::Memory>(), 72);
+}
+
+/// A surface is valid only with the estimator of its fit: another window, degree, kind or sample rate is refused.
+#[test]
+fn a_rate_estimator_that_the_calibration_does_not_name_is_refused() {
+    let calibration = example_calibration();
+    let (hz, other) = (calibration.spec().sample_rate_hz, SampleRate::new(50.0).unwrap());
+    let refused = |error: Option<ReceptorError>, parts: [&str; 2]| {
+        let error = error.expect("refused");
+        let text = error.to_string();
+        assert!(matches!(error, ReceptorError::Rate { .. }), "{text}");
+        assert!(parts.iter().all(|part| text.contains(part)), "{text}");
+    };
+    let short = SgRate::<f32, 9, 2>::new(hz).unwrap();
+    refused(
+        StretchReceptor::<f32, _>::with_rate(&calibration, short).err(),
+        ["window: 9", "window: 11"],
+    );
+    let degree = IntegerSgRate::<11, 1>::new(hz, 3.3).unwrap();
+    refused(
+        StretchReceptor::<f32, _>::with_rate(&calibration, degree).err(),
+        ["degree: 1", "degree: 2"],
+    );
+    let slow = SgRate::<f32, 11, 2>::new(other).unwrap();
+    refused(
+        StretchReceptor::<f32, _>::with_rate(&calibration, slow).err(),
+        ["at 50 Hz", "at 100 Hz"],
+    );
+    let tracker = RateFilter::<f64>::new(RateEstimator::Tracker { tracking_index: 0.1 }, hz);
+    let tracker = tracker.unwrap();
+    refused(Receptor::<f64, _>::with_rate(&calibration, tracker).err(), ["Tracker", "window: 11"]);
+    assert!(StretchReceptor::<f64, ()>::with_rate(&calibration, ()).is_ok());
 }

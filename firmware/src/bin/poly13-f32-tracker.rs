@@ -3,7 +3,7 @@
 #![no_main]
 
 use stretch_core::{Calibration, Design, Stage};
-use stretch_filter::{Tracker, TrackerSpec};
+use stretch_filter::{NamedRate, Tracker, TrackerSpec};
 use stretch_firmware::program;
 use stretch_receptor::StretchReceptor;
 
@@ -17,6 +17,9 @@ impl Design for Rate {
         self.0.memory()
     }
 }
+
+/// The calibration was fitted with another estimator. This program only measures the cost of this one.
+impl NamedRate for Rate {}
 
 impl Stage<f32> for Rate {
     type Out = Option<f32>;

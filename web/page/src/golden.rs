@@ -4,7 +4,9 @@
 use std::fmt::Write;
 
 use serde::Deserialize;
-use stretch_core::{Calibration, Design, Hertz, RateEstimator, Stage, Volts, record};
+use stretch_core::{
+    Calibration, CalibrationSpec, Design, Hertz, RateEstimator, Stage, Volts, record,
+};
 use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, RateFilter, SgRate};
 use stretch_receptor::{
     DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading, StretchReceptor, Withheld,
@@ -73,9 +75,14 @@ pub(crate) fn checksums() -> Result<String, Said> {
     volts(&mut out, "linear-f32-volts", StretchReceptor::with_rate(&linear, sg)?);
     let rate = IntegerSgRate::<11, 2>::new(hz, 3.3)?;
     volts(&mut out, &named("volts-integer"), StretchReceptor::with_rate(&poly13, rate)?);
+    // the calibration was fitted with another estimator; the board runs these for their cost
+    let with = |rate_estimator| {
+        Calibration::new(CalibrationSpec { rate_estimator, ..poly13.clone().into_spec() })
+    };
     let rate = Differentiator::new(low_pass)?;
+    let poly13 = with(RateEstimator::Differentiator { cutoff_hz: 5.0 })?;
     volts(&mut out, &named("differentiator"), StretchReceptor::with_rate(&poly13, rate)?);
-    let rate = RateFilter::<f32>::new(tracker, hz)?;
+    let (poly13, rate) = (with(tracker)?, RateFilter::<f32>::new(tracker, hz)?);
     volts(&mut out, &named("tracker"), StretchReceptor::with_rate(&poly13, rate)?);
 
     let histories: [(&str, Calibration); 2] =

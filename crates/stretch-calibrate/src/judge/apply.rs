@@ -5,7 +5,7 @@ use stretch_core::{
     Seconds, Stage, Volts,
 };
 use stretch_data::Trial;
-use stretch_filter::{Arrival, Cadence, RateFilter};
+use stretch_filter::{Arrival, Cadence, NamedRate, RateFilter};
 use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, Withheld};
 
 use crate::{
@@ -220,6 +220,8 @@ impl Design for Logged {
         0
     }
 }
+
+impl NamedRate for Logged {}
 
 impl Stage<f64> for Logged {
     type Out = Option<f64>;

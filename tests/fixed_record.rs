@@ -102,6 +102,29 @@ fn a_line_and_surfaces_run_from_their_records_within_their_bound() {
     }
 }
 
+/// The program computes from the calibration file, and its record of integers is for the board.
+#[test]
+fn a_record_for_a_board_is_refused_with_the_file_that_the_program_reads() {
+    let scratch = Scratch::new();
+    let trial = scratch.loops("a.csv", 20.0, 1.1);
+    for (model, read_as) in [("observer", "FixedObserver"), ("poly13", "FixedCalibration<11, 2>")] {
+        records(&scratch, &trial, model, read_as);
+        let before = scratch.names();
+        let says = ["cal.fixed.postcard: it is a record of integers", "12 bits", "cal.json"];
+        for (command, then) in
+            [("apply", [].as_slice()), ("evaluate", &[]), ("export", &["--c", "c"])]
+        {
+            let mut stretch = stretch();
+            let command = stretch.current_dir(scratch.path(".")).arg(command);
+            if then.is_empty() {
+                command.arg(&trial);
+            }
+            fails(command.args(["--calibration", "cal.fixed.postcard"]).args(then), &says);
+            assert_eq!(scratch.names(), before);
+        }
+    }
+}
+
 #[test]
 fn what_has_no_form_in_integers_says_so_and_writes_nothing() {
     let scratch = Scratch::new();

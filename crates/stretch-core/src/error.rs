@@ -30,8 +30,10 @@ pub enum DesignError {
         /// The checksum computed from its bytes.
         computed: u32,
     },
-    /// Bytes that are not exactly one file of the requested kind: too few, too many, or of another format.
+    /// Bytes that are no record: erased memory, too few bytes, or too many.
     NoRecord,
+    /// A record with a valid checksum that holds another type than the requested one.
+    OtherRecord,
     /// A calibration file of a schema (format version) that this release does not know.
     Schema {
         /// The schema of the file.
@@ -102,6 +104,10 @@ impl fmt::Display for DesignError {
                      another form (integers, floating point); write it again, or calibrate again"
                 )
             }
+            Self::OtherRecord => f.write_str(
+                "the seal of the record is valid, but the record holds another type: load the type that was stored, with its window and \
+                 degree (stretch export --fixed prints the type), or store the calibration again",
+            ),
             Self::Schema { found: 3, .. } => write!(
                 f,
                 "schema is 3 (bytes with turning points of movements), which only release 0.1.0 reads: write the bytes again \

@@ -52,7 +52,8 @@ pub fn store<'b, T: Serialize>(value: &T, buffer: &'b mut [u8]) -> Result<&'b [u
 ///
 /// # Errors
 /// [`DesignError::Damaged`] if the checksum does not match the bytes, [`DesignError::Schema`] for a newer schema,
-/// [`DesignError::NoRecord`] if the bytes are not exactly one binary calibration of type `T`.
+/// [`DesignError::OtherRecord`] if the checksum is valid, but the bytes are not exactly one binary calibration of type `T`,
+/// [`DesignError::NoRecord`] if they are no binary calibration.
 ///
 /// ```
 /// use stretch_core::{DesignError, record};
@@ -64,12 +65,17 @@ pub fn store<'b, T: Serialize>(value: &T, buffer: &'b mut [u8]) -> Result<&'b [u
 /// let mut damaged = bytes.to_vec();
 /// damaged[3] ^= 0x10;
 /// assert!(matches!(record::load::<(u32, f64)>(&damaged), Err(DesignError::Damaged { .. })));
+/// assert_eq!(record::load::<(u32, f64, f64)>(bytes), Err(DesignError::OtherRecord));
+/// assert_eq!(record::load::<(u32, f64)>(&[0xff; 64]), Err(DesignError::NoRecord)); // erased memory
 /// # Ok::<(), DesignError>(())
 /// ```
 pub fn load<'r, T: Deserialize<'r>>(bytes: &'r [u8]) -> Result<T, DesignError> {
-    let (value, rest) =
-        postcard::take_from_bytes(body(bytes)?).map_err(|_| DesignError::NoRecord)?;
-    if rest.is_empty() { Ok(value) } else { Err(DesignError::NoRecord) }
+    let body = body(bytes)?;
+    match postcard::take_from_bytes(body) {
+        Ok((value, [])) => Ok(value),
+        _ if body.len() < bytes.len() => Err(DesignError::OtherRecord),
+        _ => Err(DesignError::NoRecord),
+    }
 }
 
 /// Checks the checksum at the end of a binary calibration and returns it; `None` for schema 1.

@@ -8,7 +8,7 @@ use stretch_data::files::{read_whole, write_whole};
 
 use crate::CalibrateError;
 
-use super::digest;
+use super::{digest, fixed::BoardReceptor};
 
 /// Buffer size for the largest calibration in postcard, which has two poly55 surfaces and the names of sixteen trials.
 const POSTCARD_BYTES: usize = 4096;
@@ -51,7 +51,14 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
     // The specification is loaded without its checks, so that a message can name the field.
     let spec = record::load::<CalibrationSpec>(&bytes);
     let made = spec.and_then(Calibration::new);
-    made.map_err(|e| problem(format!("{UNUSABLE}: {e}")))
+    made.map_err(|e| match BoardReceptor::new(&bytes) {
+        Some(board) => problem(format!(
+            "it is a record of integers for a board with a converter of {} bits, which only `stretch listen` and the board read; give the \
+             calibration file from which `stretch export --fixed` made it, such as cal.json",
+            board.adc_bits()
+        )),
+        None => problem(format!("{UNUSABLE}: {e}")),
+    })
 }
 
 /// Reads a calibration from JSON text. Messages call the text `name`.

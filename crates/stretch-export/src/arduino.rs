@@ -1,6 +1,6 @@
 //! A header packed as a library for the Arduino IDE.
 
-use crate::{ExportError, Form, Header, part::kept};
+use crate::{ExportError, Form, Header, constants::comment_safe, part::kept};
 
 /// A file of a library folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -56,11 +56,23 @@ fn allowed(name: &str) -> String {
 }
 
 fn properties(header: &Header, name: &str) -> String {
-    include_str!("arduino/library.properties")
+    named(header, include_str!("arduino/library.properties"))
         .replace("@VERSION@", env!("CARGO_PKG_VERSION"))
         .replace("@MODEL@", &header.model)
         .replace("@FORM@", &header.form.to_string())
         .replace("@NAME@", name)
+}
+
+/// Writes the names of the signals and of the reference, which contain their units, into a text.
+fn named(header: &Header, text: &str) -> String {
+    let names: Vec<String> =
+        header.signals.iter().map(|(signal, _)| comment_safe(signal.as_str())).collect();
+    let signals = match &names[..] {
+        [signal] => format!("the signal {signal}"),
+        several => format!("the signals {}", several.join(", ")),
+    };
+    text.replace("@SIGNALS@", &signals)
+        .replace("@REFERENCE@", &comment_safe(header.reference.as_str()))
 }
 
 /// Returns the keywords that the IDE highlights and that occur in the header. A tab separates a word from its kind.
@@ -81,7 +93,7 @@ fn live(header: &Header, name: &str) -> String {
     has.extend(header.pressure.then_some("pressure"));
     let pins: Vec<String> = (0..header.array.unwrap_or(0)).map(|k| format!("A{k}")).collect();
     let [rising, falling] = header.branches;
-    kept(include_str!("arduino/Live.ino"), &has)
+    named(header, &kept(include_str!("arduino/Live.ino"), &has))
         .replace("@NAME@", name)
         .replace("@PINS@", &pins.join(", "))
         .replace("@RISING@", rising)

@@ -83,11 +83,13 @@ pub struct Header {
     pub array: Option<usize>,
     /// The resolution of an estimate in integers, with its unit; `None` for `float`.
     pub step: Option<String>,
-    /// Names of the two directions of motion: `inflation` and `deflation` for a contraction, otherwise `rising` and
-    /// `falling`.
+    /// Names of the rise and the fall of the reference: `deflation` and `inflation` for a contraction, otherwise
+    /// `rising` and `falling`.
     pub branches: [&'static str; 2],
     /// The signals of a step, with their calibrated ranges.
     pub signals: Vec<(Label, Interval)>,
+    /// The column of the reference.
+    pub reference: Label,
     /// The board's converter.
     pub adc: Adc,
 }
@@ -212,7 +214,7 @@ fn float(
 /// let options = Options { form: None, adc: parse_adc("12,0,3.3")? };
 /// let header = array_header(&stretch_sleeve::example_array(), &options)?;
 /// assert_eq!((header.array, header.model.as_str()), (Some(2), "2 gauges"));
-/// assert!(header.text.contains("stretch_step(stretch_state *s, const float *volts)"));
+/// assert!(header.text.contains("stretch_step(stretch_state *s, const float *samples)"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn array_header<const N: usize>(
@@ -311,7 +313,7 @@ fn assembled(
     };
     let step = step.iter().copied();
     let parts: Vec<&str> = if has_branches {
-        text += include_str!("c/branches.h");
+        text += &branches(source.target);
         [begin, reading]
             .into_iter()
             .chain(step)
@@ -325,10 +327,28 @@ fn assembled(
     text += "\n#endif\n";
     let id = format!("0x{:08x}u", checksum(text.as_bytes()));
     let text = text.replace("@ID@", &id);
-    let branches = [Branch::Inflation, Branch::Deflation].map(|b| source.target.branch_name(b));
+    let branches = rise_and_fall(source.target).map(|branch| source.target.branch_name(branch));
     let (step, adc) = (source.step(form), options.adc);
-    let signals = source.signals;
-    Header { text, form, model, pressure, array: None, step, branches, signals, adc }
+    let (signals, reference) = (source.signals, source.reference.clone());
+    Header { text, form, model, pressure, array: None, step, branches, signals, reference, adc }
+}
+
+/// Returns the branches on which the reference rises and falls.
+fn rise_and_fall(target: Target) -> [Branch; 2] {
+    let rise =
+        if target.reference_per_target() < 0.0 { Branch::Deflation } else { Branch::Inflation };
+    [rise, rise.opposite()]
+}
+
+/// Returns the constants of the branches.
+fn branches(target: Target) -> String {
+    let [up, down] = rise_and_fall(target).map(|branch| match branch {
+        Branch::Inflation => "RISES",
+        Branch::Deflation => "FALLS",
+    });
+    let has: &[&str] =
+        if matches!(target, Target::Contraction { .. }) { &["contraction"] } else { &[] };
+    kept(include_str!("c/branches.h"), has).replace("@UP@", up).replace("@DOWN@", down)
 }
 
 /// Returns the opening comment, which describes the file to its readers.

@@ -14,8 +14,8 @@ use crate::{ExportError, Form, part::kept};
 
 /// Number of samples.
 pub(crate) const SAMPLES: usize = 200;
-/// The value of a missing sample (`STRETCH_NO_VOLTS`), larger than any real sample.
-const NO_VOLTS: f32 = 2e18;
+/// The value of a missing sample (`STRETCH_NO_SIGNAL`), larger than any real sample.
+const NO_SIGNAL: f32 = 2e18;
 /// C expression for the flags of a reading, except its status.
 const BRANCH: &str = "(reading.branch << 2) | (reading.domain << 3)";
 /// Number of samples in one cycle up and down.
@@ -120,7 +120,7 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
             exact_memory.set_pressure(pressure.into());
             row.push(pressure);
         }
-        let volts = signal.map_or(NO_VOLTS, |volts| volts as f32);
+        let volts = signal.map_or(NO_SIGNAL, |volts| volts as f32);
         let answer = receptor.step(&mut memory, Volts(volts));
         // at the edge of the dead band, the computations in 32 and in 64 bits may choose different branches, which is
         // not an error
@@ -139,12 +139,12 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
     }
     rounding.check(fit_error(calibration), &calibration.spec().reference)?;
     let answers = &["estimate", "rate", "sd"][..if map.is_some() { 3 } else { 2 }];
-    let inputs = if crosstalk.is_some() { &["pressure", "volts"][..] } else { &["volts"] };
+    let inputs = if crosstalk.is_some() { &["pressure", "signal"][..] } else { &["signal"] };
     let fields: Vec<String> =
         inputs.iter().chain(answers).map(|name| format!("float {name};")).collect();
     let differs: Vec<String> = answers.iter().map(|answer| differs(answer)).collect();
     let differs = differs.join(" ||\n            ");
-    let text = rows.text(&fields.join("\n    "), "volts", BRANCH, &differs);
+    let text = rows.text(&fields.join("\n    "), "signal", BRANCH, &differs);
     Ok(kept(&text, if crosstalk.is_some() { &["pressure"] } else { &[] }))
 }
 
@@ -152,7 +152,7 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
 /// one sample and for five. The first gauge slips, the second is cut off, the third misses its samples, the fourth
 /// repeats one value, and at last all gauges are cut off.
 fn array_samples<const N: usize>(calibration: &ArrayCalibration<N>, n: usize) -> [f32; N] {
-    let mut out = [NO_VOLTS; N];
+    let mut out = [NO_SIGNAL; N];
     if n == 24 || (30..35).contains(&n) {
         return out;
     }
@@ -165,7 +165,7 @@ fn array_samples<const N: usize>(calibration: &ArrayCalibration<N>, n: usize) ->
             _ if n >= 190 => cut_off,
             0 if n >= 80 => min + share(n) * (max - min) + 3.0 * channel.largest_jump,
             1 if n >= 110 => cut_off,
-            2 if n >= 130 => f64::from(NO_VOLTS),
+            2 if n >= 130 => f64::from(NO_SIGNAL),
             3 if n >= 150 => min,
             _ => min + share(n) * (max - min),
         } as f32;
@@ -206,13 +206,13 @@ pub(crate) fn array<const N: usize>(
     }
     rounding.check(errors / SAMPLES as f64, &calibration.spec().reference)?;
     let fields =
-        "float volts[STRETCH_CHANNELS];\n    float estimate;\n    float sd;\n    uint16_t lost;";
+        "float signals[STRETCH_CHANNELS];\n    float estimate;\n    float sd;\n    uint16_t lost;";
     let unlike = format!(
         "reading.lost != sample->lost || {} ||\n            {}",
         differs("estimate"),
         differs("sd")
     );
-    Ok(kept(&rows.text(fields, "volts", "(reading.clamped << 2)", &unlike), &[]))
+    Ok(kept(&rows.text(fields, "signals", "(reading.clamped << 2)", &unlike), &[]))
 }
 
 /// Returns a C condition, which is true if a number of a reading differs from the number in the table's row.

@@ -314,8 +314,11 @@ fn the_arduino_example_reads_a_pin_a_gauge() {
     let library = arduino_library(&made, "Elbow").unwrap();
     let live = library.iter().find(|file| file.path.ends_with(".ino")).unwrap();
     assert!(live.text.contains("pins[STRETCH_CHANNELS] = {A0, A1};"), "{}", live.text);
+    let parts =
+        ["the signals ", "every gauge is lost", "\"warming\" : \"missing\"", "float samples["];
+    assert!(parts.iter().all(|part| live.text.contains(part)), "{}", live.text);
     let words = &library.iter().find(|file| file.path == "keywords.txt").unwrap().text;
-    assert!(words.contains("stretch_readmit\t") && !words.contains("STRETCH_INFLATION"), "{words}");
+    assert!(words.contains("stretch_readmit\t") && !words.contains("STRETCH_RISING"), "{words}");
 }
 
 #[test]

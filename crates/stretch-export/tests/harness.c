@@ -49,7 +49,7 @@ int main(void)
 #ifdef STRETCH_ZERO_LEVEL
         {
             stretch_zero told;
-            if (stretch_zero_step(&zero, word[0] == 'x' ? STRETCH_NO_VOLTS : volts, &told)) {
+            if (stretch_zero_step(&zero, word[0] == 'x' ? STRETCH_NO_SIGNAL : volts, &told)) {
                 printf("zero %08lx %08lx %08lx %lu %u\n", (unsigned long)bits_of(&told.off),
                        (unsigned long)bits_of(&told.off_reference),
                        (unsigned long)bits_of(&told.followed), (unsigned long)told.since_samples,

@@ -9,7 +9,8 @@ use compilers::{Compiler, compiled, compiler, gcc_and_gxx, on_uno, run, simulate
 use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc, read_calibration};
 use stretch_core::{
     Calibration, CalibrationSpec, Crosstalk, Degree, Design, DiagnosedMap, Interval, Knee, Model,
-    ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Surface, Values, Volts, Worn,
+    ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Surface, Target, Values,
+    Volts, Worn,
 };
 use stretch_export::{Form, HEADER, Options, arduino_library, array_header, gauge_header, header};
 use stretch_receptor::{
@@ -529,6 +530,45 @@ fn a_header_has_the_defects_that_its_map_has() {
     assert!(
         crossed.contains("stretch_set_pressure(&state, pressure)") && !crossed.contains("plays[")
     );
+}
+
+/// A rising signal shortens a muscle, so that its length falls. Without a contraction the reference rises.
+#[test]
+fn a_branch_is_the_direction_of_the_reference() {
+    let contraction = stretch_receptor::example_calibration();
+    let direct = changed(&contraction, |spec| spec.target = Target::Direct);
+    for (calibration, form, rising, falling) in [
+        (&contraction, Form::Fixed, "STRETCH_FALLING", "STRETCH_RISING"),
+        (&contraction, Form::Float, "STRETCH_FALLING", "STRETCH_RISING"),
+        (&direct, Form::Float, "STRETCH_RISING", "STRETCH_FALLING"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let made = header(calibration, &Options { form: Some(form), adc: adc() }).unwrap();
+        fs::write(folder.path().join(HEADER), &made.text).unwrap();
+        let main = format!(
+            "#include \"stretch.h\"\n\
+             int main(void) {{\n\
+                 stretch_state s;\n\
+                 int k, wrong = 0;\n\
+                 stretch_init(&s);\n\
+                 wrong |= s.branch != {rising};\n\
+                 stretch_start_on(&s, {falling});\n\
+                 wrong |= s.branch != {falling};\n\
+                 for (k = 0; k < 100; k++) stretch_step(&s, {step});\n\
+                 wrong |= s.branch != {rising};\n\
+                 for (k = 0; k < 100; k++) stretch_step(&s, {back});\n\
+                 return wrong | (s.branch != {falling});\n\
+             }}\n",
+            step = if form == Form::Fixed { "1500 + 5 * k" } else { "1.2f + 0.005f * (float)k" },
+            back = if form == Form::Fixed { "2000 - 5 * k" } else { "1.7f - 0.005f * (float)k" },
+        );
+        let (source, program) = (folder.path().join("main.c"), folder.path().join("main"));
+        fs::write(&source, main).unwrap();
+        let cc = Command::new("cc").arg("-o").arg(&program).arg(&source).output().unwrap();
+        assert!(cc.status.success(), "{cc:?}");
+        assert!(Command::new(program).status().unwrap().success(), "{rising} in {form}");
+        assert!(!made.text.contains("INFLATION"), "{}", made.text);
+    }
 }
 
 /// A file that includes one header twice compiles. A file that includes the headers of two calibrations, of two forms

@@ -1,15 +1,15 @@
 @if one
-// Reads the bridge's amplifier on A0 and prints the estimate, one line per sample, at 115200 baud.
+// Reads @SIGNALS@ on A0 and prints @REFERENCE@, one line per sample, at 115200 baud.
 @end
 @if array
-// Reads several gauges, one amplifier each on A0 and the pins after it, and prints the estimate, one line
-// per sample, at 115200 baud.
+// Reads @SIGNALS@ on A0 and the pins after it, and prints @REFERENCE@,
+// one line per sample, at 115200 baud.
 @end
 #include <stretch_@NAME@.h>
 
 // analogRead of these boards always returns 10 bits
 #if defined(__AVR__) && STRETCH_ADC_BITS != 10
-#error "the converter of this board has 10 bits: stretch export --adc 10,0,5 (from 0 to 5 V)"
+#error "the converter of this board has 10 bits: stretch export --adc 10,0,5 (a signal in volts) or 10,0,1023 (in counts)"
 #endif
 
 #if !defined(STRETCH_PERIOD_US)
@@ -59,11 +59,11 @@ void loop() {
   stretch_set_pressure(&state, pressure);
 @end
 @if float
-  float volts = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(A0);
-  stretch_reading reading = stretch_step(&state, volts);
+  float sample = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(A0);
+  stretch_reading reading = stretch_step(&state, sample);
 @end
-  if (reading.status == STRETCH_WARMING) {
-    Serial.println("warming");
+  if (reading.status != STRETCH_OK) {
+    Serial.println(reading.status == STRETCH_WARMING ? "warming" : "missing");
     return;
   }
 @if fixed
@@ -73,17 +73,19 @@ void loop() {
   Serial.print(reading.estimate, 3);
 @end
   Serial.print(" " STRETCH_UNIT);
-  Serial.print(reading.branch == STRETCH_INFLATION ? " @RISING@" : " @FALLING@");
+  Serial.print(reading.branch == STRETCH_RISING ? " @RISING@" : " @FALLING@");
   Serial.println(reading.domain == STRETCH_INSIDE ? "" : " outside the calibrated domain");
 @end
 @if array
-  float volts[STRETCH_CHANNELS];
+  float samples[STRETCH_CHANNELS];
   for (int k = 0; k < STRETCH_CHANNELS; k++) {
-    volts[k] = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(pins[k]);
+    samples[k] = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(pins[k]);
   }
-  stretch_reading reading = stretch_step(&state, volts);
+  stretch_reading reading = stretch_step(&state, samples);
   if (reading.status != STRETCH_OK) {
-    Serial.println(reading.status == STRETCH_ALL_LOST ? "every gauge is lost" : "warming");
+    bool all = reading.status == STRETCH_ALL_LOST;
+    bool warming = reading.status == STRETCH_WARMING;
+    Serial.println(all ? "every gauge is lost" : warming ? "warming" : "missing");
     return;
   }
   Serial.print(reading.estimate, 3);

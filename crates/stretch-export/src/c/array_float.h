@@ -357,15 +357,15 @@ static STRETCH_APART stretch_reading stretch_lost(stretch_state *s)
     return stretch_estimate(s);
 }
 
-/* Takes one sample per channel, in the unit of the signals; NaN or STRETCH_NO_VOLTS is a missing sample. */
-static STRETCH_APART stretch_reading stretch_step(stretch_state *s, const float *volts)
+/* Takes one sample per channel, in the unit of the signals; NaN or STRETCH_NO_SIGNAL is a missing sample. */
+static STRETCH_APART stretch_reading stretch_step(stretch_state *s, const float *samples)
 {
     int change = 0, heard = 0, waiting = 0, k;
     for (k = 0; k < STRETCH_CHANNELS; k++) {
         const stretch_channel *c = &s->of[k];
         if (c->loss == STRETCH_IN_USE) {
-            change |= !c->begun || !(volts[k] >= c->last && volts[k] <= c->last);
-            heard |= stretch_usable(volts[k]);
+            change |= !c->begun || !(samples[k] >= c->last && samples[k] <= c->last);
+            heard |= stretch_usable(samples[k]);
         }
     }
     if (!heard) {
@@ -375,7 +375,7 @@ static STRETCH_APART stretch_reading stretch_step(stretch_state *s, const float 
     for (k = 0; k < STRETCH_CHANNELS; k++) {
         stretch_channel *c = &s->of[k];
         if (c->loss == STRETCH_IN_USE) {
-            c->loss = stretch_take(c, k, volts[k], change);
+            c->loss = stretch_take(c, k, samples[k], change);
             waiting |= c->loss == STRETCH_IN_USE && !c->begun;
         }
     }

@@ -1,6 +1,12 @@
-/* Direction in which the target moves: stretch_reading.branch. */
-#define STRETCH_INFLATION 0
-#define STRETCH_DEFLATION 1
+/* Direction in which the reference moves: stretch_reading.branch. */
+#define STRETCH_RISING STRETCH_TARGET_@UP@
+#define STRETCH_FALLING STRETCH_TARGET_@DOWN@
+@if contraction
+/* The target of the calibration is a contraction, which rises as the reference falls. The program stretch
+ * calls STRETCH_FALLING inflation and STRETCH_RISING deflation. */
+@end
+#define STRETCH_TARGET_RISES 0
+#define STRETCH_TARGET_FALLS 1
 
 /* Whether the inputs are in the range of the calibration: stretch_reading.domain. */
 #define STRETCH_INSIDE 0

@@ -64,7 +64,7 @@ static inline void stretch_init(stretch_state *s)
     s->baseline = 0.0f;
     s->excess = 0.0f;
 @end
-    s->branch = STRETCH_INFLATION;
+    s->branch = STRETCH_TARGET_RISES;
     s->missing = STRETCH_MAX_BRIDGED;
 }
 
@@ -497,17 +497,17 @@ static STRETCH_APART stretch_reading stretch_lost(stretch_state *s)
     return stretch_answer(STRETCH_MISSING, s->branch, STRETCH_INSIDE, 0.0f, 0.0f);
 }
 
-/* Takes a sample in the unit of the signal; NaN or STRETCH_NO_VOLTS is a missing sample. */
-static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
+/* Takes a sample in the unit of the signal; NaN or STRETCH_NO_SIGNAL is a missing sample. */
+static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float sample)
 {
     stretch_reading reading;
     float signal, target, variance;
     uint8_t domain;
-    if (!stretch_usable(volts)) {
+    if (!stretch_usable(sample)) {
         return stretch_lost(s);
     }
     s->missing = 0;
-    signal = STRETCH_SIGN * volts;
+    signal = STRETCH_SIGN * sample;
 @if rest
     signal = stretch_above_rest(s, signal);
 @end
@@ -518,9 +518,9 @@ static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
     }
     domain = stretch_correct(s, signal) ? STRETCH_INSIDE : STRETCH_SIGNAL_CLAMPED;
     if (s->rate > STRETCH_DEAD_BAND) {
-        s->branch = STRETCH_INFLATION;
+        s->branch = STRETCH_TARGET_RISES;
     } else if (s->rate < -STRETCH_DEAD_BAND) {
-        s->branch = STRETCH_DEFLATION;
+        s->branch = STRETCH_TARGET_FALLS;
     }
     target = s->target;
     variance = s->yy;

@@ -21,7 +21,7 @@
 
 /* A sample beyond this size, or one that is not a number, is a missing sample. */
 #define STRETCH_LARGEST 1e18f
-#define STRETCH_NO_VOLTS 2e18f
+#define STRETCH_NO_SIGNAL 2e18f
 
 /* false for NaN as well */
 STRETCH_INLINE int stretch_usable(float x)

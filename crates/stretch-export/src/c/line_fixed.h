@@ -13,10 +13,10 @@ STRETCH_INLINE int32_t stretch_estimate(const stretch_state *s, uint32_t sample,
 {
     stretch_surface room;
     const stretch_surface *surface = STRETCH_LOADED(room, stretch_surfaces[0]);
-    const int32_t volts =
+    const int32_t signal =
         stretch_clamp(&surface->signal, ((int32_t)sample - surface->centre) * 32768,
                       STRETCH_SIGNAL_CLAMPED, outside);
-    const uint64_t sum = stretch_sum((uint32_t)surface->intercept, 0x7fffffffu, surface->slope, volts);
+    const uint64_t sum = stretch_sum((uint32_t)surface->intercept, 0x7fffffffu, surface->slope, signal);
     (void)s;
     (void)rate;
     return (int32_t)(stretch_product(stretch_high(sum), surface->thousandths) >> 32);

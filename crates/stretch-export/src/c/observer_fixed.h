@@ -33,7 +33,7 @@ static inline void stretch_init(stretch_state *s)
     stretch_forget(s);
     s->baseline = 0;
     s->excess = 0;
-    s->branch = STRETCH_INFLATION;
+    s->branch = STRETCH_TARGET_RISES;
     s->missing = STRETCH_MAX_BRIDGED;
 }
 
@@ -278,9 +278,9 @@ static inline stretch_reading stretch_step(stretch_state *s, int32_t code)
     }
     on_curve = stretch_correct(s, signal);
     if (s->rate > STRETCH_DEAD_BAND) {
-        s->branch = STRETCH_INFLATION;
+        s->branch = STRETCH_TARGET_RISES;
     } else if (s->rate < -STRETCH_DEAD_BAND) {
-        s->branch = STRETCH_DEFLATION;
+        s->branch = STRETCH_TARGET_FALLS;
     }
     scaled = STRETCH_ZERO + stretch_product(STRETCH_GAIN, s->target);
     return stretch_answer(STRETCH_OK, s->branch, on_curve ? STRETCH_INSIDE : STRETCH_SIGNAL_CLAMPED,

@@ -30,7 +30,7 @@ static inline void stretch_init(stretch_state *s)
     stretch_forget(s);
     s->baseline = 0.0f;
     s->excess = 0.0f;
-    s->branch = STRETCH_INFLATION;
+    s->branch = STRETCH_TARGET_RISES;
     s->missing = STRETCH_MAX_BRIDGED;
 }
 
@@ -229,16 +229,16 @@ static STRETCH_APART stretch_reading stretch_lost(stretch_state *s)
     return stretch_answer(STRETCH_MISSING, s->branch, STRETCH_INSIDE, 0.0f, 0.0f);
 }
 
-/* Takes a sample in the unit of the signal; NaN or STRETCH_NO_VOLTS is a missing sample. */
-static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
+/* Takes a sample in the unit of the signal; NaN or STRETCH_NO_SIGNAL is a missing sample. */
+static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float sample)
 {
     float signal;
     int on_curve;
-    if (!stretch_usable(volts)) {
+    if (!stretch_usable(sample)) {
         return stretch_lost(s);
     }
     s->missing = 0;
-    signal = STRETCH_SIGN * volts;
+    signal = STRETCH_SIGN * sample;
 #if STRETCH_FOLLOWS_REST
     signal = stretch_above_rest(s, signal);
 #endif
@@ -249,9 +249,9 @@ static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float volts)
     }
     on_curve = stretch_correct(s, signal);
     if (s->rate > STRETCH_DEAD_BAND) {
-        s->branch = STRETCH_INFLATION;
+        s->branch = STRETCH_TARGET_RISES;
     } else if (s->rate < -STRETCH_DEAD_BAND) {
-        s->branch = STRETCH_DEFLATION;
+        s->branch = STRETCH_TARGET_FALLS;
     }
     return stretch_answer(STRETCH_OK, s->branch, on_curve ? STRETCH_INSIDE : STRETCH_SIGNAL_CLAMPED,
                           STRETCH_ZERO + STRETCH_GAIN * s->target, STRETCH_GAIN * s->rate);

@@ -1,6 +1,7 @@
-/* Call this after stretch_init if the stream is known to begin on STRETCH_DEFLATION. */
+/* Call this after stretch_init if the direction of the reference at the beginning of the stream is known:
+ * STRETCH_RISING or STRETCH_FALLING. */
 static inline void stretch_start_on(stretch_state *s, uint8_t branch)
 {
-    s->branch = branch == STRETCH_INFLATION ? STRETCH_INFLATION : STRETCH_DEFLATION;
+    s->branch = branch == STRETCH_TARGET_RISES ? STRETCH_TARGET_RISES : STRETCH_TARGET_FALLS;
 }
 

@@ -29,7 +29,7 @@ static inline void stretch_forget(stretch_state *s)
 static inline void stretch_init(stretch_state *s)
 {
     stretch_forget(s);
-    s->branch = STRETCH_INFLATION;
+    s->branch = STRETCH_TARGET_RISES;
     s->missing = STRETCH_MAX_BRIDGED;
 }
 

@@ -138,18 +138,18 @@ STRETCH_INLINE uint32_t stretch_zero_first(const stretch_zero_state *z, float of
 }
 
 /* A sample minus the followed zero. Pass the result to stretch_step. */
-static inline float stretch_zero_corrected(const stretch_zero_state *z, float volts)
+static inline float stretch_zero_corrected(const stretch_zero_state *z, float sample)
 {
-    return volts - STRETCH_ZERO_SIGN * z->followed;
+    return sample - STRETCH_ZERO_SIGN * z->followed;
 }
 
 /* Takes a sample in the unit of the signal. Returns 1 if a movement has ended, from the fifth on. */
-static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float volts, stretch_zero *told)
+static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float sample, stretch_zero *told)
 {
     float level = 0.0f, off = 0.0f, limit, share, clipped, before;
     int whole, jumped, lasts, shifted, k;
     z->samples += 1u;
-    if (!stretch_usable(volts) || !stretch_zero_turn(z, STRETCH_ZERO_SIGN * volts, &level)) {
+    if (!stretch_usable(sample) || !stretch_zero_turn(z, STRETCH_ZERO_SIGN * sample, &level)) {
         return 0;
     }
     for (k = 1; k < STRETCH_ZERO_LEVELS; k++) {

@@ -106,8 +106,8 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
     let model = receptor.model();
     let direction = model.direction();
     let [rising, falling] = match direction.rising {
-        Branch::Inflation => ["STRETCH_INFLATION", "STRETCH_DEFLATION"],
-        Branch::Deflation => ["STRETCH_DEFLATION", "STRETCH_INFLATION"],
+        Branch::Inflation => ["STRETCH_TARGET_RISES", "STRETCH_TARGET_FALLS"],
+        Branch::Deflation => ["STRETCH_TARGET_FALLS", "STRETCH_TARGET_RISES"],
     };
     let mut constants = Constants::default();
     constants
@@ -119,8 +119,8 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             direction.dead_band,
             "the branch changes only at a rate above this one",
         )
-        .word("RISING", rising, "the branch of a rising signal")
-        .word("FALLING", falling, "");
+        .word("SIGNAL_RISES", rising, "the branch of a rising signal")
+        .word("SIGNAL_FALLS", falling, "");
     let (name, surface) = match model.map() {
         Map::Line(line) => {
             let Line { signal, offset, slope, intercept } = line;

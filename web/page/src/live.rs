@@ -3,8 +3,10 @@
 
 use std::fmt::Write;
 
-use stretch_calibrate::{Doubt, LiveReceptor, Seen, calibration_from_json, parse_adc};
-use stretch_core::{Calibration, Runner, Volts};
+use stretch_calibrate::{
+    Doubt, LiveReceptor, Seen, calibration_from_json, converter_reach, parse_adc,
+};
+use stretch_core::{Calibration, Interval, Runner, Volts};
 use stretch_data::push_number;
 use stretch_link::{Answer, Decoder, Event, Frame, TimeLine};
 use stretch_receptor::{
@@ -146,6 +148,10 @@ struct Frames {
 
 impl Frames {
     fn new(adc: Adc, calibration: Option<&Calibration>) -> Result<Self, Said> {
+        if let Some(spec) = calibration.map(Calibration::spec) {
+            let range = Interval { min: spec.signal_range.min(), max: spec.signal_range.max() };
+            converter_reach(&spec.signal, range, &adc)?;
+        }
         Ok(Self {
             decoder: Decoder::new(),
             adc,

@@ -136,9 +136,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 /// for another converter can be used without its constants.
 fn notes(made: &Header) -> Vec<String> {
     made.converter_notes().unwrap_or_else(|error| {
-        vec![format!(
-            "{error}; STRETCH_ADC_ZERO and STRETCH_ADC_PER_CODE convert no code correctly"
-        )]
+        vec![format!("{error}; otherwise do not use STRETCH_ADC_ZERO and STRETCH_ADC_PER_CODE")]
     })
 }
 

@@ -16,7 +16,7 @@ pub struct File {
 /// sample rate.
 ///
 /// The file name of the header is `stretch_` followed by the library's name. It therefore differs from the headers of
-/// other libraries, and libraries of several calibrations can be installed together. A sketch includes one of them.
+/// other libraries, and libraries of several calibrations can be installed together. A file includes one of them.
 /// Characters that a name may not have become `_`. Copy the folder into the `libraries` folder of the sketchbook.
 /// Source: Arduino library specification, revision 2.2 (format 1.5).
 ///

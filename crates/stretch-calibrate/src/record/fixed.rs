@@ -133,8 +133,8 @@ pub fn converter_reach(
     let beyond = (zero_v - min).max(max - full_scale_v) > 0.01 * (max - min);
     let codes = (max - min) / adc.volts_per_code();
     let what = match (beyond, codes < FEW_CODES) {
-        (true, _) => "which is only a part of that range".to_owned(),
-        (false, true) => format!("in which that range has only {codes:.1} codes"),
+        (true, _) => "so that it measures only a part of that range".to_owned(),
+        (false, true) => format!("so that the range has only {codes:.1} codes"),
         (false, false) => return Ok(None),
     };
     Ok(Some(format!(

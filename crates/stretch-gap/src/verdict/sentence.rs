@@ -69,7 +69,7 @@ impl Diagnosis {
             Some(Answer::Missing { .. } | Answer::Partly { .. }) => {
                 "Add them to the simulator, then diagnose again."
             }
-            Some(Answer::WrongRecord { .. }) => "Correct the recording, then diagnose again.",
+            Some(Answer::WrongRecord { .. }) => "Correct this error, then diagnose again.",
             Some(Answer::Unknown { .. })
                 if self.proposed.as_ref().is_some_and(|p| !p.equation.is_empty()) =>
             {
@@ -172,7 +172,7 @@ impl Answer {
                 };
                 format!(
                     "{found}with its parameters re-tuned the simulator leaves {left:.3} times the noise, most of it in {stage}. Noise as it is described \
-                     stays below {noise:.3} in 19 of 20 records like this one: it is larger, or something is missing."
+                     stays below {noise:.3} in 19 of 20 recordings like this one: it is larger, or something is missing."
                 )
             }
             Self::Missing { effects, closes, faint, ended } => {

@@ -83,8 +83,7 @@ impl Reach {
         let sentence = format!(
             "{count} of {all} samples lie outside the range of the calibration, {low} to {high}{unit}, and were limited to it"
         );
-        let best = POWERS.zip(self.inside).max_by_key(|(power, inside)| (*inside, -power.abs()));
-        let (code, text) = match best.filter(|(_, inside)| 2 * inside > self.samples) {
+        let (code, text) = match self.best_power() {
             Some((power, inside)) => {
                 let asked = in_other_unit(&self.unit, power)
                     .map_or("is the unit wrong".to_owned(), |unit| format!("are they in {unit}"));
@@ -99,6 +98,23 @@ impl Reach {
             None => ("outside_range", format!("{sentence}: {IS_IT_THE_SENSOR}")),
         };
         Some(Doubt::new(code, text))
+    }
+}
+
+impl Reach {
+    /// Returns the power of ten that brings most samples inside, with their number. If several powers do so, because the
+    /// range contains zero, it is the one that makes the samples about as wide as the range; `None` if there is none.
+    fn best_power(&self) -> Option<(i32, u64)> {
+        let brings = POWERS.zip(self.inside).filter(|(_, inside)| 2 * inside > self.samples);
+        let brings: Vec<(i32, u64)> = brings.collect();
+        let is_as_wide = |(power, _): &&(i32, u64)| {
+            let share = (self.seen.max - self.seen.min) * ten_to(*power) / self.range.span();
+            (share.log10() * 2.0).abs() <= 1.0
+        };
+        match &brings[..] {
+            [one] => Some(*one),
+            several => several.iter().find(is_as_wide).copied(),
+        }
     }
 }
 
@@ -184,6 +200,29 @@ mod tests {
         assert!(other.contains("the calibrated sensor"), "{other}");
         let other = doubt([1e2 * middle; 3]).expect("all are outside");
         assert!(other.contains("is the unit wrong? 3 lie inside when divided by 100"), "{other}");
+    }
+
+    /// Every large divisor brings samples into a range that contains zero.
+    #[test]
+    fn a_unit_is_guessed_only_if_it_makes_the_samples_as_wide_as_the_range() {
+        let mut spec = stretch_receptor::example_calibration().into_spec();
+        spec.signal_range = RangeSpec { min: -0.1, max: 1.0, zero: 0.0 }.try_into().unwrap();
+        let range = spec.signal_range;
+        let inside = [0; COUNT];
+        let told = |factor: f64| {
+            let mut reach = Reach {
+                range,
+                unit: "V".to_owned(),
+                samples: 0,
+                seen: extent(std::iter::empty()),
+                inside,
+            };
+            (0..=10).for_each(|i| reach.take(factor * (0.1 * f64::from(i) - 0.05)));
+            reach.take(factor);
+            reach.doubt().map(|doubt| doubt.text).unwrap_or_default()
+        };
+        assert!(told(1000.0).contains("are they in mV?"), "{}", told(1000.0));
+        assert!(told(20.0).contains("when divided by 10"), "{}", told(20.0));
     }
 
     #[test]

@@ -245,7 +245,8 @@ fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
         row[0] = if k.get() > 2000 { 9.0 } else { row[0] };
     });
     let (cut, said) = scratch.error("cal.json", "cut.csv");
-    assert!(said.contains("s1 is left out from 40.00 s on: outside"), "{said}");
+    assert!(said.contains("s1 is left out from 40.00 s on: its signal is outside"), "{said}");
+    assert!(said.contains("outside the calibrated domain") && said.contains("2000 with a gauge left out"), "{said}");
     assert!(whole < cut && cut < 20.0 * whole, "{cut} beside {whole}");
     let (k, stuck_at) = (std::cell::Cell::new(0), std::cell::Cell::new(0.0));
     scratch.worn("stuck.csv", worn, |row| {
@@ -256,7 +257,7 @@ fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
         row[1] = stuck_at.get();
     });
     let (stuck, said) = scratch.error("cal.json", "stuck.csv");
-    assert!(said.contains("s2 is left out from 40.") && said.contains("s on: still"), "{said}");
+    assert!(said.contains("s2 is left out from 40.") && said.contains("s on: its signal repeats one value"), "{said}");
     assert!(stuck < 20.0 * whole, "{stuck} beside {whole}");
     // A command for one gauge refuses several gauges.
     let evaluate = &mut scratch.sleeve(&["evaluate", "--calibration", "cal.json", "knee.csv"]);

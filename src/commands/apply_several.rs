@@ -5,9 +5,13 @@ use std::{
     path::Path,
 };
 
+use stretch_calibrate::Doubt;
 use stretch_data::{Trial, push_number, unit};
 use stretch_recording::ReadOptions;
-use stretch_sleeve::{AppliedArray, ArrayCalibration, MAX_CHANNELS, apply_array};
+use stretch_sleeve::{
+    AppliedArray, ArrayCalibration, ArrayChannel, ArrayLoss, ArrayReading, MAX_CHANNELS,
+    apply_array,
+};
 
 use super::{apply::write_out, reading::read_recording};
 use crate::{display::warn, table::number};
@@ -27,13 +31,38 @@ pub(super) fn apply_several(
     let applied = apply_array(calibration, &trial)?;
     write_out(out, |out| write_all(calibration, &trial, &applied, out))?;
     for (channel, time_s, loss) in &applied.losses {
-        let name = calibration.spec().channels[*channel].signal.as_str();
-        warn(format!("stretch: {}: {name} is left out from {time_s:.2} s on: {loss}", trial.name));
+        let ArrayChannel { signal, possible, .. } = &calibration.spec().channels[*channel];
+        let at = trial.time_s.iter().position(|time| time == time_s);
+        let sample = at.and_then(|at| trial.channel(signal.as_str())?.get(at).copied());
+        let beyond = |sample: f64| (sample - possible.max).max(possible.min - sample);
+        let by = match sample.filter(|_| *loss == ArrayLoss::Outside) {
+            Some(sample) => format!(", by {}", number(beyond(sample))),
+            None => String::new(),
+        };
+        warn(format!(
+            "stretch: {}: {signal} is left out from {time_s:.2} s on: {loss}{by}",
+            trial.name
+        ));
     }
     tell_shifts(calibration, &trial.name, &applied);
-    let withheld = applied.readings.iter().filter(|reading| reading.is_err()).count();
-    warn(format!("{} samples: {withheld} without an estimate", applied.readings.len()));
+    report(&applied);
     Ok(())
+}
+
+/// Prints how many samples have an estimate, and of what quality.
+fn report(applied: &AppliedArray) {
+    let count = |is_one: &dyn Fn(&ArrayReading<f64>) -> bool| {
+        applied.readings.iter().flatten().filter(|reading| is_one(reading)).count() as u64
+    };
+    let samples = applied.readings.len() as u64;
+    let (estimated, clamped) = (count(&|_| true), count(&|reading| reading.clamped));
+    warn(format!(
+        "{samples} samples: {} without an estimate, {clamped} outside the calibrated domain, {} with a gauge left out",
+        samples - estimated,
+        count(&|reading| reading.lost != 0)
+    ));
+    let doubt = Doubt::of_clamped(clamped, estimated);
+    doubt.iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
 }
 
 /// Prints a line each time a gauge begins to deviate from the other gauges.

@@ -30,6 +30,11 @@ impl Doubt {
         Self { code, text }
     }
 
+    /// Returns a doubt about a log if most of its samples were clamped to the calibrated range.
+    pub fn of_clamped(clamped: u64, samples: u64) -> Option<Self> {
+        not_its_own(clamped, samples).map(|text| Self::new("outside_range", text))
+    }
+
     /// Prefixes the text with the name of a trial or a method.
     fn of(self, name: &str) -> Self {
         Self { text: format!("{name}: {}", self.text), ..self }
@@ -100,8 +105,7 @@ impl Seen {
 }
 
 fn outside(reach: &Reach, clamped: u64, samples: u64) -> Option<Doubt> {
-    let clamped = || not_its_own(clamped, samples).map(|text| Doubt::new("outside_range", text));
-    reach.doubt().or_else(clamped)
+    reach.doubt().or_else(|| Doubt::of_clamped(clamped, samples))
 }
 
 impl Applied {
@@ -154,7 +158,8 @@ pub fn evaluation_doubts(
         ];
         let said = words.into_iter().filter_map(|(code, text)| Some(Doubt::new(code, text?)));
         let outside = outside(&reach, errors.clamped, errors.samples);
-        all.extend(outside.into_iter().chain(said).map(|doubt| doubt.of(name)));
+        // A shift comes first, because it also puts samples outside the range.
+        all.extend(said.chain(outside).map(|doubt| doubt.of(name)));
     }
     all
 }

@@ -82,10 +82,10 @@ impl core::error::Error for ArrayWithheld {}
 impl core::fmt::Display for ArrayLoss {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.pad(match self {
-            Self::Missing => "missing",
-            Self::Outside => "outside",
-            Self::Still => "still",
-            Self::Slipped => "slipped",
+            Self::Missing => "its samples are missing",
+            Self::Outside => "its signal is outside the range that is possible for it",
+            Self::Still => "its signal repeats one value while other signals change",
+            Self::Slipped => "its signal jumped away from what the other signals predict",
         })
     }
 }

@@ -256,7 +256,8 @@ fn whole_channels(
     let mut holes: Vec<usize> = Vec::new();
     for channel in std::mem::take(&mut track.channels) {
         let of_it = || (0..channel.values.len()).filter(|i| !channel.values[*i].is_finite());
-        let is_needed = is_needed(&channel.name, options);
+        let few = || BadRows::are_few(of_it().count() + holes.len(), channel.values.len());
+        let is_needed = is_needed(&channel.name, options) || (options.all_columns && few());
         if let Some(hole) = of_it().next().filter(|_| is_needed) {
             let value = channel.values[hole].to_string();
             let row = track.stamps.rows.row(hole);

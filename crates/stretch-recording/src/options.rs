@@ -111,6 +111,7 @@ pub struct ReadOptions {
     pub(crate) time: String,
     pub(crate) time_unit: Option<TimeUnit>,
     required: Vec<String>,
+    pub(crate) all_columns: bool,
     pub(crate) columns: Option<Vec<String>>,
     pub(crate) sample_rate_hz: Option<f64>,
     pub(crate) untimed_hz: Option<f64>,
@@ -130,6 +131,7 @@ impl Default for ReadOptions {
             time: TIME.to_owned(),
             time_unit: None,
             required: Vec::new(),
+            all_columns: false,
             columns: None,
             sample_rate_hz: None,
             untimed_hz: None,
@@ -170,6 +172,13 @@ impl ReadOptions {
     /// Requires a column. It must be present, and a row in which it is not a finite number cannot be read.
     pub fn require(mut self, column: impl Into<String>) -> Self {
         self.required.push(column.into());
+        self
+    }
+
+    /// Also keeps the columns that are not required, if nearly all of their values are numbers. A row in which one of
+    /// them has no number is then left out, as for a required column.
+    pub fn all_columns(mut self) -> Self {
+        self.all_columns = true;
         self
     }
 

@@ -66,7 +66,7 @@ impl Columns {
             .filter(|&i| Some(i) != time && roles[i] != Role::Skipped)
             .map(|column| Kept { column, values: Vec::new(), holes: 0, words: 0, first: None })
             .collect();
-        let keeps_all = options.required().is_empty();
+        let keeps_all = options.all_columns || options.required().is_empty();
         let (counts, rows, holes) = (Vec::new(), Rows::default(), Vec::new());
         Ok(Self { roles, counts, rows, kept, keeps_all, holes })
     }

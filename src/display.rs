@@ -28,7 +28,7 @@ use textwrap::{Options, WordSeparator, WordSplitter, WrapAlgorithm};
 /// How much is printed in addition to results and errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Volume {
-    /// `-q`: nothing; for a diagnosis, only the verdict.
+    /// `-q`: only the sentence of a result, and for a calibration the files written.
     Quiet,
     /// Files written, warnings, and progress on a terminal.
     Usual,
@@ -98,6 +98,46 @@ pub(crate) fn say_first(text: impl Display) -> anyhow::Result<()> {
         true => say_as_is(text),
         false => write_out(&painted(&text, Style::new().bold(), &io::stdout())),
     }
+}
+
+/// Most lines below the sentence of a result, without `-v`.
+const MOST_LINES: usize = 15;
+
+/// Prints paragraphs and tables below the sentence of a result: with `-q` none, with `-v` all, and
+/// otherwise those that fit in [`MOST_LINES`] lines together with the paths of `written` files, which
+/// come last.
+///
+/// # Errors
+/// Never, as [`say`].
+pub(crate) fn say_below<'a>(
+    blocks: impl IntoIterator<Item = String>,
+    written: impl IntoIterator<Item = &'a Path>,
+) -> anyhow::Result<()> {
+    let written: Vec<String> =
+        written.into_iter().map(|path| format!("wrote {}", path.display())).collect();
+    let lines = |text: &str| wrapped(&plain(text)).lines().count();
+    // One line says what -v adds.
+    let last: usize = 1 + written.iter().map(|text| lines(text)).sum::<usize>();
+    let mut room = if is_verbose() { usize::MAX } else { MOST_LINES.saturating_sub(last) };
+    let mut left_out = 0;
+    for block in blocks.into_iter().filter(|_| !is_quiet()) {
+        match room.checked_sub(lines(&block)) {
+            Some(rest) => {
+                room = rest;
+                say(block)?;
+            }
+            None => left_out += 1,
+        }
+    }
+    if volume() == Volume::Usual {
+        let more = match left_out {
+            0 => String::new(),
+            1 => " and one more paragraph".to_owned(),
+            n => format!(" and {n} more paragraphs"),
+        };
+        say(format!("-v prints the details{more}."))?;
+    }
+    written.into_iter().try_for_each(say)
 }
 
 /// Prints a result that other programs read, without wrapping: code, JSON, TOML.

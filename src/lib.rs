@@ -40,7 +40,7 @@ use display::Volume;
 struct Cli {
     /// Print only results and errors
     ///
-    /// For a diagnosis, print only the verdict.
+    /// For a diagnosis, a calibration or an evaluation, print only its sentence.
     #[arg(short, long, global = true, conflicts_with = "verbose", display_order = 900)]
     quiet: bool,
     /// Also print what is read and chosen

@@ -11,8 +11,8 @@ use clap::ValueEnum;
 use serde::Deserialize;
 use stretch_calibrate::{
     CalibrateError, Calibrated, Candidate, MODELS_IN_WORDS, Memory, ModelChoice, ModelKind,
-    Options, Robust, SpellingError, calibrate, choose_model, evaluate, explains_little,
-    explains_nothing, parse_rate, rank_signals, without_gross_errors,
+    Options, Robust, SpellingError, calibrate, choose_model_watched, evaluate, evaluate_errors,
+    explains_little, explains_nothing, parse_rate, rank_signals, without_gross_errors,
 };
 use stretch_core::RateEstimator;
 use stretch_data::files::{Outputs, read_whole};
@@ -20,15 +20,15 @@ use stretch_data::{Split, Trial};
 use stretch_gap::Diagnosis;
 use stretch_problem::{Causes, causes, name_of};
 use stretch_recording::{ReadOptions, RecordingError, tidy_column};
-use stretch_report::{Context, Judged, calibration_page};
+use stretch_report::{Context, Judged, calibration_page, calibration_verdict};
 use stretch_sleeve::calibrate_gauge;
 
 use super::{
     calibrate_sleeve,
-    calibration_text::{print, print_models},
+    calibration_text::{blocks_of_calibration, blocks_of_models},
     json::Json,
     reading::{Recorded, columns, read_trials, with_columns_to_name},
-    shared::{Completed, detail, of_files, spinner, stage_text, tell},
+    shared::{Completed, detail, of_files, say_below, say_first, spinner, stage_text},
 };
 
 /// Fit a calibration to logged trials
@@ -63,7 +63,7 @@ pub(crate) struct Args {
     /// Report with figures to write
     #[arg(long, value_name = "r.html", conflicts_with_all = SLEEVE)]
     report: Option<PathBuf>,
-    /// Trials on which the report evaluates the calibration [default: the fitted ones]
+    /// Trials on which the calibration is judged [default: the fitted ones]
     #[arg(long, value_name = "TRIAL.csv", num_args = 1.., conflicts_with_all = SLEEVE)]
     test: Vec<PathBuf>,
     /// linear, curve, polyIJ, observer, history, diagnosed, or auto [default: poly13]
@@ -385,7 +385,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         Signal::Best(names) | Signal::Together(names) => names,
     };
     let columns = args.recorded.options().require(&args.reference);
-    let mut columns = named.iter().fold(columns, |columns, name| columns.require(name));
+    let mut columns = match named {
+        [] => columns.all_columns(),
+        named => named.iter().fold(columns, |columns, name| columns.require(name)),
+    };
     let (trials, is_table) = args.read(&mut columns)?;
     options.is_table = is_table;
     // Outliers are removed only from the named columns, because candidate signals may be anything.
@@ -397,7 +400,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let ranking = match signal {
         Signal::Best(names) => {
             let all = || other_columns(&trials, std::slice::from_ref(&args.reference));
-            let names = if names.is_empty() { all() } else { names };
+            let names = if names.is_empty() { all()? } else { names };
             rank_signals(&trials, &names, &options).map_err(named)?
         }
         _ => Vec::new(),
@@ -412,7 +415,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     options.causes.clone_from(&causes.found);
     let choice = match args.model() {
-        Model::Auto => Some(choose_model(&trials, &options).map_err(named)?),
+        Model::Auto => Some(choose(&trials, &options).map_err(named)?),
         Model::One(_) => None,
     };
     if let Some(choice) = &choice {
@@ -438,12 +441,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let gauge = calibrate_gauge(calibrated.calibration.clone(), &trials, &options);
     let record = gauge.map_err(named)?.bytes(&args.out)?;
     outputs.file(&args.out, |out| out.write_all(&record))?;
+    let test = read_trials(&args.test, Split::Test, &columns)?;
+    let judged = verdict(&calibrated, &trials, &test, &options);
     if let Some(path) = &args.report {
         // The line is the baseline with which every surface is compared.
         let linear = Options { model: ModelKind::Linear, ..options.clone() };
         let linear = calibrate(&trials, &linear).map_err(named)?;
         let fitted = [&linear, &calibrated];
-        let page = report(&args, &trials, &columns, fitted, (&ranking, choice.as_ref()), &options)?;
+        let page = report(&trials, &test, fitted, (&ranking, choice.as_ref()), &options)?;
         stage_text(&mut outputs, path, &page)?;
     }
     let answer = serde_json::json!({
@@ -456,31 +461,73 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         "notes": calibrated.notes,
     });
     args.json.conclude(outputs, &answer, || {
-        if let Some(choice) = &choice {
-            print_models(choice, &options.reference)?;
+        let mut blocks = Vec::new();
+        match &choice {
+            Some(choice) => {
+                say_first(format!("Chosen: {}.", choice.why))?;
+                blocks.extend((!test.is_empty()).then_some(judged));
+                blocks.extend(blocks_of_models(choice, &options.reference));
+            }
+            None => say_first(judged)?,
         }
-        print(&calibrated, &ranking)?;
-        tell(format!("wrote {}", args.out.display()))?;
-        args.report.iter().try_for_each(|path| tell(format!("wrote {}", path.display())))
+        blocks.extend(blocks_of_calibration(&calibrated, &ranking, choice.is_some()));
+        say_below(blocks, std::iter::once(&args.out).chain(&args.report).map(PathBuf::as_path))
+    })
+}
+
+/// Chooses a model, and shows on a terminal how many have been judged.
+fn choose(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateError> {
+    let bar = spinner();
+    let show =
+        |done: usize, of: usize| bar.set_message(format!("judging {of} models, {done} done"));
+    let choice = choose_model_watched(trials, options, &show);
+    bar.finish_and_clear();
+    choice
+}
+
+/// Returns the sentence with the error of a calibration on the test trials, or on the fitted trials if
+/// there are no test trials.
+fn verdict(calibrated: &Calibrated, trials: &[Trial], test: &[Trial], options: &Options) -> String {
+    let name = options.model.to_string();
+    let judged = if test.is_empty() { trials } else { test };
+    let evaluation = match evaluate_errors(&[(&name, &calibrated.calibration)], judged) {
+        Ok(evaluation) => evaluation,
+        Err(error) => return format!("{name} was fitted but not judged, because {error}."),
+    };
+    let calibrated_on = trials.iter().map(|trial| trial.name.clone()).collect();
+    let context = Context { calibrated_on, ..Context::default() };
+    calibration_verdict(&Judged {
+        calibrated: &[(&name, calibrated)],
+        evaluation: &evaluation,
+        context: &context,
     })
 }
 
 /// Returns the columns of the first trial, except those in `but`.
-pub(super) fn other_columns(trials: &[Trial], but: &[String]) -> Vec<String> {
+///
+/// # Errors
+/// There is no other column.
+pub(super) fn other_columns(trials: &[Trial], but: &[String]) -> anyhow::Result<Vec<String>> {
     let channels = trials.first().into_iter().flat_map(|trial| &trial.channels);
-    channels.map(|channel| channel.name.clone()).filter(|name| !but.contains(name)).collect()
+    let names = channels.map(|channel| channel.name.clone()).filter(|name| !but.contains(name));
+    let names: Vec<String> = names.collect();
+    ensure!(
+        !names.is_empty(),
+        "{}: no column of numbers is left for a signal; the columns of numbers are the time and {}: name the signal with --signal",
+        trials.first().map_or("", |trial| trial.name.as_str()),
+        but.join(", ")
+    );
+    Ok(names)
 }
 
 fn report(
-    args: &Args,
     trials: &[Trial],
-    columns: &ReadOptions,
+    test: &[Trial],
     [linear, calibrated]: [&Calibrated; 2],
     (ranking, choice): (&[Candidate], Option<&ModelChoice>),
     options: &Options,
 ) -> anyhow::Result<String> {
-    let test = read_trials(&args.test, Split::Test, columns)?;
-    let judged = if test.is_empty() { trials } else { &test };
+    let judged = if test.is_empty() { trials } else { test };
     let name = options.model.to_string();
     let mut shown = vec![("linear", linear)];
     if options.model != ModelKind::Linear {
@@ -492,7 +539,7 @@ fn report(
     let context = Context {
         title: format!("Calibration of {} on {}", options.reference, options.signal),
         calibrated_on: names(trials),
-        tested_on: names(&test),
+        tested_on: names(test),
         signal_choice: ranking.to_vec(),
         notes: choice
             .map(|choice| format!("{}; {MODELS_IN_WORDS}", choice.why))

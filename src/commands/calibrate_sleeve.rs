@@ -15,12 +15,9 @@ use stretch_sleeve::{
 use super::{
     calibrate::{Args, Signal, other_columns},
     reading::{read_trials, with_columns_to_name},
-    shared::{of_files, say, stage_text, tell},
+    shared::{of_files, say_below, say_first, stage_text},
 };
-use crate::{
-    display::warn,
-    table::{maybe, number, table},
-};
+use crate::table::{maybe, number, table};
 
 /// A calibration to one reference, with the data that `--json` prints.
 #[derive(Serialize)]
@@ -74,10 +71,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     // The update itself requires the prior's signals, so only named signals are required here.
     let asked = references.iter().chain(named.iter().filter(|_| args.names_signals()));
     let columns = asked.fold(args.recorded.options(), |columns, name| columns.require(name));
+    let columns = if named.is_empty() { columns.all_columns() } else { columns };
     let trials = read_trials(&args.trials, Split::Fit, &columns);
     let own = "name your columns with --reference and --signal";
     let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
-    let signals = if named.is_empty() { other_columns(&trials, &references) } else { named };
+    let signals = if named.is_empty() { other_columns(&trials, &references)? } else { named };
     let of_trials = |error: SleeveError| of_files(error, &args.trials);
     let one = |reference: &String| match &prior {
         Some(prior) => update(prior, &trials, &signals, reference, &args.of),
@@ -105,9 +103,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         several => Answer::Several(several),
     };
     args.json.conclude(outputs, &answer, || {
-        made.iter().try_for_each(print)?;
-        let mut written = records.iter().chain(&args.session);
-        written.try_for_each(|path| tell(format!("wrote {}", path.display())))
+        made.iter().try_for_each(|made| say_first(sentence(made)))?;
+        let written = records.iter().chain(&args.session).map(PathBuf::as_path);
+        say_below(made.iter().flat_map(blocks), written)
     })
 }
 
@@ -170,27 +168,38 @@ fn record_of(out: &Path, reference: &str) -> PathBuf {
     }
 }
 
-fn print(made: &Made) -> anyhow::Result<()> {
-    let unit = unit_of(&made.reference);
-    if let Some(rmse) = made.rmse {
-        let joined = made.signals.join(", ");
-        let to = &made.reference;
-        say(format!("{to} on {joined}: RMSE {} {unit} on data left out of the fit", number(rmse)))?;
-        let header = ["channel", &format!("alone, RMSE {unit}"), "without it", "reduces MSE by"];
+/// Returns the error of a calibration as a sentence.
+fn sentence(made: &Made) -> String {
+    let with_unit =
+        |x: f64| format!("{} {}", number(x), unit_of(&made.reference)).trim_end().to_owned();
+    let what = format!("The calibration of {} on {}", made.reference, made.signals.join(", "));
+    match (made.rmse, &made.update) {
+        (Some(rmse), _) => {
+            let off = with_unit(rmse);
+            format!("{what} is off by {off} (RMSE) on parts of the trials that were not fitted.")
+        }
+        (None, Some(update)) => format!(
+            "{what}, from the prior and {:.1} s of reference, has an expected RMSE of {}; 95 % of estimates are within {}.",
+            update.seconds,
+            with_unit(update.expected_rmse),
+            with_unit(update.half_width_95)
+        ),
+        (None, None) => format!("{what} was fitted."),
+    }
+}
+
+/// Returns the share of each channel as a table, and the notes.
+fn blocks(made: &Made) -> Vec<String> {
+    let mut blocks = Vec::new();
+    if made.rmse.is_some() {
+        let alone = format!("alone, RMSE {}", unit_of(&made.reference));
+        let header = ["channel", alone.trim_end(), "without it", "reduces MSE by"];
         let row = |c: &Carried| {
             let adds = c.adds.map_or("-".to_owned(), |adds| format!("{:.0} %", 100.0 * adds));
             vec![c.signal.clone(), maybe(c.rmse_alone), maybe(c.rmse_without), adds]
         };
-        say(table(&header, made.carried.iter().map(row)))?;
+        blocks.push(table(&header, made.carried.iter().map(row)));
     }
-    if let Some(update) = &made.update {
-        say(format!(
-            "{:.1} s of reference; expected RMSE {} {unit}, 95 % of estimates within {} {unit}",
-            update.seconds,
-            number(update.expected_rmse),
-            number(update.half_width_95)
-        ))?;
-    }
-    made.notes.iter().for_each(|note| warn(format!("note: {note}")));
-    Ok(())
+    blocks.extend(made.notes.iter().map(|note| format!("note: {note}")));
+    blocks
 }

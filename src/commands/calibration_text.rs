@@ -1,10 +1,11 @@
 //! A calibration as text on a terminal.
 
-use stretch_calibrate::{Calibrated, Candidate, FitReport, MODELS_IN_WORDS, ModelChoice, ModelRow};
+use stretch_calibrate::{
+    Calibrated, Candidate, FitReport, MODELS_IN_WORDS, Memory, ModelChoice, ModelKind, ModelRow,
+};
 use stretch_data::unit_of;
 use stretch_report::{order_table, signal_table};
 
-use super::shared::{say, say_first, tell};
 use crate::display::is_verbose;
 use crate::table::{maybe, number, table, table_text};
 
@@ -15,20 +16,76 @@ const SQUARED_EXCESS: &str = "MSE above best";
 /// Headings of the columns for single kinds of trial.
 const KINDS: [&str; 3] = ["arbitrary", "pulses", "ramps"];
 
-/// Prints the models that `auto` compared. Columns without values are left out.
-pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Result<()> {
-    say_first(format!("Chosen: {}.", choice.why))?;
+/// Number of models, or of signals, that are shown without `-v`.
+const SHOWN: usize = 4;
+
+/// Returns the models that `auto` compared as a table, with the chosen model first, and which of them
+/// exports to C. Without `-v`, only the best models are shown.
+pub(super) fn blocks_of_models(choice: &ModelChoice, reference: &str) -> Vec<String> {
+    let chosen = choice.model.to_string();
+    let (own, others): (Vec<&ModelRow>, Vec<_>) =
+        choice.rows.iter().partition(|row| row.model == chosen);
+    let most = if is_verbose() { usize::MAX } else { SHOWN };
+    let shown: Vec<&ModelRow> = own.into_iter().chain(others).take(most).collect();
     let unit = unit_of(reference);
     let unit = if unit.is_empty() { unit } else { format!(" in {unit}") };
-    say(format!("Models, RMSE{unit} on trials left out of the fit:"))?;
-    let row = |r: &ModelRow| {
-        if let Some(problem) = &r.problem {
-            return vec![r.model.clone(), problem.clone()];
+    let count = match choice.rows.len() {
+        all if all > shown.len() => format!("; {} of {all} models", shown.len()),
+        _ => String::new(),
+    };
+    let mut blocks: Vec<String> = on_this_computer(choice, reference).into_iter().collect();
+    blocks.push(format!(
+        "RMSE{unit} on trials left out of the fit (* chosen{count}):\n{}",
+        table_of_models(&shown, &chosen)
+    ));
+    if is_verbose() {
+        blocks.push(format!("Models: {MODELS_IN_WORDS}."));
+        blocks.push(
+            "worst: the largest error. coefficients: their number. M3 instr.: measured instructions per sample on a Cortex-M3, f32 (fixed point). \
+             MSE above best: mean squared error minus that of the best model. \u{b1}: one standard error."
+                .to_owned(),
+        );
+        let problems =
+            choice.rows.iter().filter_map(|row| Some((&row.model, row.problem.as_ref()?)));
+        blocks.extend(
+            problems.map(|(model, problem)| format!("{model} cannot be fitted: {problem}")),
+        );
+    }
+    blocks
+}
+
+/// Whether `stretch export --c` writes a model.
+fn exports_to_c(model: &str) -> bool {
+    let kind: Result<ModelKind, _> = model.parse();
+    !matches!(kind, Ok(ModelKind::Remembering { kind: Memory::History, .. }))
+}
+
+/// Returns a sentence for a chosen model that has no C code, with the best one that has.
+fn on_this_computer(choice: &ModelChoice, reference: &str) -> Option<String> {
+    let chosen = choice.model.to_string();
+    if exports_to_c(&chosen) {
+        return None;
+    }
+    let best = choice.rows.iter().find(|row| exports_to_c(&row.model) && row.rmse.is_some())?;
+    let error = format!("{} {}", maybe(best.rmse), unit_of(reference));
+    Some(format!(
+        "{chosen} runs on a computer and in Rust only; the best model that exports to C is {} (RMSE {}).",
+        best.model,
+        error.trim_end()
+    ))
+}
+
+/// Formats models as a table. Columns without values are left out.
+fn table_of_models(rows: &[&ModelRow], chosen: &str) -> String {
+    let row = |r: &&ModelRow| {
+        let name = if r.model == chosen { format!("{} *", r.model) } else { r.model.clone() };
+        if r.problem.is_some() {
+            return vec![name, "not fitted".to_owned()];
         }
         let excess =
             |(mean, error): (f64, f64)| format!("{} \u{b1} {}", number(mean), number(error));
         vec![
-            r.model.clone(),
+            name,
             maybe(r.rmse),
             maybe(r.rmse_arbitrary),
             maybe(r.rmse_pulses),
@@ -38,7 +95,6 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
             r.parameters.to_string(),
             instructions(r),
             r.excess.map_or("-".to_owned(), excess),
-            if r.model == choice.model.to_string() { "chosen".to_owned() } else { String::new() },
         ]
     };
     let header = [
@@ -52,9 +108,8 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
         "coefficients",
         "M3 instr.",
         SQUARED_EXCESS,
-        "",
     ];
-    let rows: Vec<Vec<String>> = choice.rows.iter().map(row).collect();
+    let rows: Vec<Vec<String>> = rows.iter().map(row).collect();
     let has_values = |i: &usize| rows.iter().any(|row| row.get(*i).is_some_and(|cell| cell != "-"));
     // with trials of one kind only, the column of that kind repeats the first one
     let is_kind = |i: &usize| KINDS.contains(&header[*i]);
@@ -67,15 +122,7 @@ pub(super) fn print_models(choice: &ModelChoice, reference: &str) -> anyhow::Res
     let columns: Vec<usize> = (0..header.len()).filter(is_shown).collect();
     let picked = |row: &Vec<String>| columns.iter().filter_map(|i| row.get(*i).cloned()).collect();
     let header: Vec<&str> = columns.iter().map(|i| header[*i]).collect();
-    say(table(&header, rows.iter().map(picked)))?;
-    if is_verbose() {
-        say(format!("Models: {}.", MODELS_IN_WORDS))?;
-        say(
-            "worst: the largest error. coefficients: their number. M3 instr.: measured instructions per sample on a Cortex-M3, f32 (fixed point). \
-             MSE above best: mean squared error minus that of the best model. \u{b1}: one standard error.",
-        )?;
-    }
-    Ok(())
+    table(&header, rows.iter().map(picked))
 }
 
 /// Formats the instruction count from volts in `f32`, and in fixed point if the model has such a
@@ -88,21 +135,29 @@ fn instructions(row: &ModelRow) -> String {
     }
 }
 
-/// Prints the tables of a calibration. With `-v`, prints everything that the paper of the published
-/// method lists.
-pub(super) fn print(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
-    print_fits(calibrated, ranking)?;
-    if is_verbose() {
-        print_coefficients(calibrated)?;
+/// Returns the tables and notes of a calibration, with the quality of each fit unless its model was
+/// `chosen` from a table. With `-v`, they contain everything that the paper of the published method
+/// lists.
+pub(super) fn blocks_of_calibration(
+    calibrated: &Calibrated,
+    ranking: &[Candidate],
+    chosen: bool,
+) -> Vec<String> {
+    let mut blocks = Vec::new();
+    if !ranking.is_empty() {
+        let most = if is_verbose() { ranking.len() } else { SHOWN.min(ranking.len()) };
+        blocks.push(table_text(&signal_table(&ranking[..most])));
     }
-    print_notes(calibrated)
+    blocks.extend((!chosen || is_verbose()).then(|| table_of_fits(calibrated)));
+    if is_verbose() {
+        blocks.extend(coefficients(calibrated));
+    }
+    blocks.extend(calibrated.notes.iter().map(|note| format!("note: {note}")));
+    blocks
 }
 
-/// Prints the quality of each fit.
-fn print_fits(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<()> {
-    if !ranking.is_empty() {
-        say(table_text(&signal_table(ranking)))?;
-    }
+/// Formats the quality of each fit.
+fn table_of_fits(calibrated: &Calibrated) -> String {
     let row = |fit: &FitReport| {
         vec![
             fit.name.clone(),
@@ -114,19 +169,11 @@ fn print_fits(calibrated: &Calibrated, ranking: &[Candidate]) -> anyhow::Result<
         ]
     };
     let header = ["fit", "model", "samples", "R^2", "RMSE % of range", "condition"];
-    say(table(&header, calibrated.fits.iter().map(row)))
+    table(&header, calibrated.fits.iter().map(row))
 }
 
-fn print_notes(calibrated: &Calibrated) -> anyhow::Result<()> {
-    for note in &calibrated.notes {
-        tell(format!("note: {note}"))?;
-    }
-    Ok(())
-}
-
-/// Prints the coefficients of each fit, and the orders among which it was chosen.
-fn print_coefficients(calibrated: &Calibrated) -> anyhow::Result<()> {
-    say("Coefficients (normalised rate r, signal V) with 95 % bounds:")?;
+/// Formats the coefficients of each fit, and the orders among which it was chosen.
+fn coefficients(calibrated: &Calibrated) -> Vec<String> {
     let rows = calibrated.fits.iter().flat_map(|fit| {
         fit.coefficients.iter().map(|c| {
             vec![
@@ -137,8 +184,12 @@ fn print_coefficients(calibrated: &Calibrated) -> anyhow::Result<()> {
             ]
         })
     });
-    say(table(&["coefficient", "estimate", "lower", "upper"], rows))?;
+    let coefficients = table(&["coefficient", "estimate", "lower", "upper"], rows);
+    let mut blocks = vec![format!(
+        "Coefficients (normalised rate r, signal V) with 95 % bounds:\n{coefficients}"
+    )];
     // If there is only one order, there is nothing to compare.
-    let mut fits = calibrated.fits.iter().filter(|fit| fit.orders.len() > 1);
-    fits.try_for_each(|fit| say(table_text(&order_table(fit))))
+    let fits = calibrated.fits.iter().filter(|fit| fit.orders.len() > 1);
+    blocks.extend(fits.map(|fit| table_text(&order_table(fit))));
+    blocks
 }

@@ -20,9 +20,9 @@ use stretch_sim::{ActiveEffect, RunSettings, TrialPlan, demo_preset, effect_name
 
 use super::{
     apply::write_all,
-    calibration_text::{print as print_calibration, print_models},
+    calibration_text::{blocks_of_calibration, blocks_of_models},
     diagnose::{print as print_diagnosis, told_on},
-    evaluate::print_errors,
+    evaluate::table_of_errors,
     json::Json,
     reading::column,
     shared::{or_force, say, say_first, spinner, tell, write_text},
@@ -305,17 +305,18 @@ fn print(sessions: &Sessions, job: &Job, result: &str) -> anyhow::Result<()> {
     sessions.notes.iter().try_for_each(|note| say(format!("\n{note}")))?;
     if is_verbose() {
         say(format!("\nThe paper's calibrations, on {}:", trials(sessions.ramps().len())))?;
-        print_calibration(surfaces, &job.ranking)?;
+        blocks_of_calibration(surfaces, &job.ranking, false).into_iter().try_for_each(say)?;
         say(format!("\nChosen by cross-validation on {}:", trials(sessions.fit.len())))?;
-        print_models(choice, &sessions.reference)?;
+        say(format!("Chosen: {}.", choice.why))?;
+        blocks_of_models(choice, &sessions.reference).into_iter().try_for_each(say)?;
         say("\nTested on trials that were not fitted:")?;
         for (kind, methods) in kinds {
-            print_errors(kind, methods, &evaluation.unit)?;
+            say(table_of_errors(kind, methods, &evaluation.unit))?;
         }
     }
     say("")?;
     let tested = format!("On {} that no fit has seen", trials(sessions.test.len()));
-    print_errors(&tested, &evaluation.pooled, &evaluation.unit)?;
+    say(table_of_errors(&tested, &evaluation.pooled, &evaluation.unit))?;
     if is_verbose() {
         say("\nWhy simulator and rig disagree:")?;
         print_diagnosis(&job.examined)?;

@@ -2,16 +2,18 @@
 
 use std::path::PathBuf;
 
-use stretch_calibrate::{Evaluation, MethodErrors, evaluate, evaluation_doubts, read_calibration};
+use stretch_calibrate::{
+    Evaluation, MethodErrors, TrialErrors, evaluate, evaluation_doubts, read_calibration,
+};
 use stretch_data::Split;
 use stretch_report::{comparison_table, errors_in_words, method_table};
 
 use super::{
     json::Json,
     reading::{Recorded, read_trials, with_columns_to_name},
-    shared::{say, say_first, short_name},
+    shared::{say_below, say_first, short_name},
 };
-use crate::display::warn;
+use crate::display::{is_verbose, warn};
 use crate::table::table_text;
 
 /// Evaluate calibrations on trials that have a reference
@@ -62,35 +64,40 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     args.json.answer(&evaluation, || print(&evaluation))
 }
 
-/// Prints the errors on some trials in the table of the published method ("the paper").
-pub(super) fn print_errors(
-    title: &str,
-    methods: &[MethodErrors],
-    unit: &str,
-) -> anyhow::Result<()> {
+/// Formats the errors on some trials as the table of the published method ("the paper").
+pub(super) fn table_of_errors(title: &str, methods: &[MethodErrors], unit: &str) -> String {
     let names: Vec<String> = methods.iter().map(|errors| errors.method.clone()).collect();
-    say(table_text(&method_table(title, methods, &names, unit)))
+    table_text(&method_table(title, methods, &names, unit))
 }
 
-/// Prints that table for each trial, and for all trials together.
-pub(super) fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
-    let unit = &evaluation.unit;
-    let name = |i: usize| evaluation.pooled[i].method.clone();
-    if let Some(errors) = errors_in_words(&evaluation.pooled, unit, name) {
+/// Prints the error as a sentence and the table of all trials. With `-v`, also prints a table for
+/// each trial, and tests whether the methods differ.
+fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
+    let Evaluation { unit, trials, pooled, comparisons } = evaluation;
+    let name = |i: usize| pooled[i].method.clone();
+    if let Some(errors) = errors_in_words(pooled, unit, name) {
         say_first(errors)?;
     }
-    for trial in &evaluation.trials {
-        print_errors(&trial.trial, &trial.methods, unit)?;
+    let mut blocks = Vec::new();
+    if is_verbose() && trials.len() > 1 {
+        let each = |trial: &TrialErrors| table_of_errors(&trial.trial, &trial.methods, unit);
+        blocks.extend(trials.iter().map(each));
     }
-    if evaluation.trials.len() > 1 {
-        print_errors("All trials", &evaluation.pooled, unit)?;
+    let title = match &trials[..] {
+        [one] => one.trial.as_str(),
+        _ => "All trials",
+    };
+    blocks.push(table_of_errors(title, pooled, unit));
+    if is_verbose() {
+        blocks.push(
+            "Average error: mean |reference - estimate| over the range of the estimate, as in the paper. Bias: mean of estimate minus \
+             reference. Lag: positive if the estimate is late. Outside domain: samples whose signal or rate of change was clamped to the \
+             calibrated range."
+                .to_owned(),
+        );
+        if !comparisons.is_empty() {
+            blocks.push(table_text(&comparison_table(comparisons, unit, str::to_owned)));
+        }
     }
-    say(
-        "Average error: mean |reference - estimate| over the range of the estimate, as in the paper. Lag: positive if the estimate \
-         is late. Outside domain: samples whose signal or rate of change was clamped to the calibrated range.",
-    )?;
-    if evaluation.comparisons.is_empty() {
-        return Ok(());
-    }
-    say(table_text(&comparison_table(&evaluation.comparisons, unit, str::to_owned)))
+    say_below(blocks, std::iter::empty())
 }

@@ -90,17 +90,11 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
     let names = method_names(calibrated, evaluation);
     let methods = &evaluation.pooled;
     let called = |i: usize| match (methods[i].method.as_str(), names.get(i)) {
-        (method, Some(name)) => {
-            let kind = || method.parse::<ModelKind>().ok();
-            let remembers = kind().is_some_and(|k| matches!(k, ModelKind::Remembering { .. }));
-            match (remembers, name.split_once(" (")) {
-                (true, _) => "the calibration with memory".to_owned(),
-                // the table names the model
-                (false, Some((words, _))) => format!("the {words} calibration"),
-                (false, None) => format!("the {name} calibration"),
-            }
+        (method, Some(name)) if method.parse::<ModelKind>().is_err() => {
+            // the table names the model
+            format!("the {} calibration", name.split(" (").next().unwrap_or(name))
         }
-        (method, None) => method.to_owned(),
+        (method, _) => method.to_owned(),
     };
     let Some(errors) = errors_in_words(methods, &evaluation.unit, called) else {
         return "No estimate could be compared with a reference.".to_owned();

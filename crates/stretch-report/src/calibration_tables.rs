@@ -47,12 +47,14 @@ pub fn method_table(
     unit: &str,
 ) -> Table {
     let rmse = labelled("RMSE", unit);
+    let bias = labelled("Bias", unit);
     let largest = with_unit("Largest error,", unit);
     let head = [
         "Method",
         "Average error, %",
         &rmse,
         "RMSE, % of range",
+        &bias,
         "R\u{b2}",
         "Lag, ms",
         largest.trim_end_matches(','),
@@ -65,6 +67,7 @@ pub fn method_table(
             fixed(m.average_error_percent, 2),
             number(m.rmse, 3),
             fixed(m.rmse_percent, 2),
+            number(m.bias, 3),
             fixed(m.r_squared, 3),
             m.lag_s.map_or_else(|| NONE.to_owned(), |lag| fixed(1e3 * lag, 0)),
             number(m.max, 3),

@@ -203,8 +203,7 @@ fn the_first_sentence_says_what_the_numbers_say() {
     assert_eq!(
         sentence(&made.page(&context("tuesday"))),
         format!(
-            "On a recording that was not used for the fit, the non-linear calibration is \
-             off by {} (RMSE, {}\u{a0}% of the range); the raw signal \
+            "On a recording that was not used for the fit, poly13 is off by {} (RMSE, {}\u{a0}% of the range); the raw signal \
              by {}.",
             deg(poly13),
             number(poly13.rmse_percent, 2),

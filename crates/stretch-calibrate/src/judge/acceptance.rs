@@ -5,7 +5,7 @@ use stretch_data::Trial;
 
 use crate::{fit::FitReport, prepare::without_gross_errors};
 
-use super::evaluate::MethodErrors;
+use super::{evaluate::MethodErrors, reach::four_digits};
 
 /// A fit whose error is more than this share of the reference's standard deviation explains nothing, because the mean
 /// of the reference alone has an error that is at most about a twentieth larger. (The same margin of a twentieth
@@ -77,22 +77,32 @@ pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
 /// Smallest constant error that is reported, in percent of the range of the reference.
 const FAR_OFF_PERCENT: f64 = 5.0;
 
-/// Returns a sentence for estimates whose error is mostly constant: `bias^2` is at least half of `rmse^2`, and the bias
-/// is more than a twentieth of the range.
+/// Least share of the RMSE that vanishes with the mean error, for a mean error that is reported.
+const LEAST_GAIN: f64 = 0.2;
+
+/// Returns a sentence for estimates that are shifted: without their mean error, the RMSE would be smaller by at least a
+/// fifth, and the mean error is more than a twentieth of the range.
 ///
-/// Typical causes are a reference in centimetres with a calibration in millimetres, and a sensor that was mounted
-/// again.
+/// ```text
+/// sqrt(rmse^2 - bias^2) <= 0.8 rmse
+/// ```
+///
+/// Typical causes are a sensor that was put on again, and a reference in centimetres with a calibration in millimetres.
 pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String> {
     let MethodErrors { bias, rmse, rmse_percent, .. } = *errors;
     let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
-    (is_far && 2.0 * bias * bias >= rmse * rmse).then(|| {
-        let off = format!("{:.4} {unit}", bias.abs());
+    let unshifted = (rmse * rmse - bias * bias).max(0.0).sqrt();
+    (is_far && unshifted <= (1.0 - LEAST_GAIN) * rmse).then(|| {
+        let with_unit = |x: f64| format!("{} {unit}", four_digits(x)).trim_end().to_owned();
         let side = if bias > 0.0 { "above" } else { "below" };
         format!(
-            "the estimate is {} {side} the reference on average, which is most of its error: is the reference in the unit of the \
-             calibration? If not, convert it (stretch convert --column 'length_mm=length_cm*10'). If it is, the sensor was mounted again \
-             or has drifted: calibrate again; half a minute of reference is enough with a prior of earlier sessions (calibrate --prior)",
-            off.trim_end()
+            "was the sensor put on again? The estimate is shifted: it is {} {side} the reference on average. Without this shift, the \
+             RMSE would be {} instead of {}. Calibrate again: half a minute of reference is enough with a prior of earlier sessions \
+             (stretch calibrate --prior), and stretch sleeve renew needs no reference. Or is the reference in another unit? If so, \
+             convert it (stretch convert --column 'length_mm=length_cm*10')",
+            with_unit(bias.abs()),
+            with_unit(unshifted),
+            with_unit(rmse)
         )
     })
 }

@@ -131,6 +131,26 @@ pub fn evaluate(
     calibrations: &[(&str, &Calibration)],
     trials: &[Trial],
 ) -> Result<Evaluation, CalibrateError> {
+    evaluate_lag(calibrations, trials, MAX_LAG_S)
+}
+
+/// Evaluates calibrations as [`evaluate`] does, but without lags, whose search takes most of the time.
+///
+/// # Errors
+/// As [`evaluate`].
+pub fn evaluate_errors(
+    calibrations: &[(&str, &Calibration)],
+    trials: &[Trial],
+) -> Result<Evaluation, CalibrateError> {
+    evaluate_lag(calibrations, trials, 0.0)
+}
+
+/// Evaluates calibrations and searches lags up to `most_s`; with zero, no lag is returned.
+fn evaluate_lag(
+    calibrations: &[(&str, &Calibration)],
+    trials: &[Trial],
+    most_s: f64,
+) -> Result<Evaluation, CalibrateError> {
     let (_, first) = calibrations.first().ok_or(CalibrateError::NoTrials)?;
     check_rows(trials, MOST_ROWS)?;
     let names: Vec<&str> =
@@ -165,7 +185,7 @@ pub fn evaluate(
         let period_s = 1.0 / rate_hz;
         let mut errors = Vec::new();
         for ((name, method), all) in names.iter().zip(&methods).zip(&mut pooled) {
-            let tally = Tally::of(&reference, method, period_s);
+            let tally = Tally::of(&reference, method, period_s, most_s);
             all.merge(&tally);
             let nothing = || CalibrateError::NothingEstimated {
                 trial: trial.name.clone(),
@@ -236,7 +256,8 @@ struct Tally {
 }
 
 impl Tally {
-    fn of(reference: &[f64], method: &Estimates, period_s: f64) -> Self {
+    /// Compares estimates with the reference, and searches lags up to `most_s`, if that is not zero.
+    fn of(reference: &[f64], method: &Estimates, period_s: f64, most_s: f64) -> Self {
         let mut tally = Self { clamped: method.clamped, ..Self::default() };
         for (&truth, &estimate) in reference.iter().zip(&method.values) {
             if estimate.is_nan() {
@@ -248,8 +269,9 @@ impl Tally {
         // The warm-up is at the start. The lag is computed from the first estimate on.
         let start = method.values.iter().position(|x| !x.is_nan()).unwrap_or(reference.len());
         let (truth, estimate) = (&reference[start..], &method.values[start..]);
-        let most = ((MAX_LAG_S / period_s) as usize).min(truth.len() / 4);
-        if let Ok(found) = lag(truth, estimate, most)
+        let most = ((most_s / period_s) as usize).min(truth.len() / 4);
+        if most_s > 0.0
+            && let Ok(found) = lag(truth, estimate, most)
             && !found.at_limit
         {
             tally.lag = (found.samples * period_s * truth.len() as f64, truth.len() as u64);

@@ -13,10 +13,10 @@ mod reach;
 pub use acceptance::{explains_little, explains_nothing};
 pub use apply::{Applied, Faults, LiveReceptor, apply, at_rate, on_own_ranges, pressure_column};
 pub use doubt::{Doubt, Seen, evaluation_doubts};
-pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate};
+pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate, evaluate_errors};
 pub use left_out::{Judged, judge_model};
 pub use model_choice::{
     Candidate, ModelChoice, ModelRow, candidate_models, choose_among, choose_model,
-    m3_instructions, m3_instructions_fixed, rank_signals,
+    choose_model_watched, m3_instructions, m3_instructions_fixed, rank_signals,
 };
 pub use reach::Reach;

@@ -1,5 +1,7 @@
 //! Chooses a model or a signal by cross-validation, and gives the cost of a model on a board.
 
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+
 use rayon::prelude::*;
 use serde::Serialize;
 use stretch_core::Degree;
@@ -86,11 +88,29 @@ pub struct ModelChoice {
 /// # Errors
 /// The [`CalibrateError`] of the simplest model if none can be fitted.
 pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateError> {
+    choose_model_watched(trials, options, &|_, _| {})
+}
+
+/// Chooses a model as [`choose_model`] does, and reports after each candidate how many of how many have been judged.
+///
+/// # Errors
+/// As [`choose_model`].
+pub fn choose_model_watched(
+    trials: &[Trial],
+    options: &Options,
+    report: &(dyn Fn(usize, usize) + Sync),
+) -> Result<ModelChoice, CalibrateError> {
     let rows: usize = trials.iter().map(Trial::len).sum();
     let candidates = candidate_models(options);
     let mut judged = Vec::new();
+    let done = AtomicUsize::new(0);
+    report(0, candidates.len());
     for together in candidates.chunks((JUDGED_TOGETHER / rows.max(1)).max(1)) {
-        let judge = |&kind: &ModelKind| (kind, judge_model(trials, options, kind));
+        let judge = |&kind: &ModelKind| {
+            let judged = judge_model(trials, options, kind);
+            report(done.fetch_add(1, Relaxed) + 1, candidates.len());
+            (kind, judged)
+        };
         judged.par_extend(together.par_iter().map(judge));
     }
     let mut first = None;
@@ -316,8 +336,8 @@ pub struct Candidate {
     pub problem: Option<String>,
 }
 
-/// Ranks signals by their cross-validated error with the model of `options`,
-/// best first.
+/// Ranks signals by their cross-validated error with the model of `options`, best first; with poly13 for a model with
+/// memory.
 ///
 /// The folds are trials (at most sixteen folds), or tenths of the data if there are fewer than three trials.
 ///
@@ -333,6 +353,8 @@ pub fn rank_signals(
     for signal in signals {
         let surfaces = match options.model {
             ModelKind::Linear => ModelKind::Surface(Degree::LINE),
+            // A fit with memory is not cross-validated.
+            ModelKind::Remembering { .. } => ModelKind::Surface(Degree::POLY13),
             surface => surface,
         };
         let with = Options { signal: signal.clone(), model: surfaces, ..options.clone() };

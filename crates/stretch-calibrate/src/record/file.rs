@@ -161,10 +161,11 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
         let field = error.path().to_string();
         let cause = error.into_inner();
         if object.contains("\"largest_jump\"") {
-            return unusable(
-                "it is for several gauges: only stretch apply, sleeve renew and export accept it"
-                    .into(),
+            let problem = format!(
+                "a calibration of several gauges can only be used by stretch apply, sleeve renew and export; to compare it with a \
+                 reference, write its estimates with stretch apply --calibration {name} TRIAL.csv --out estimates.csv"
             );
+            return CalibrateError::Record { file: name.to_owned(), problem };
         }
         unusable(if field == "." { cause.to_string() } else { format!("in {field}: {cause}") })
     })?;

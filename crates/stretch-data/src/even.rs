@@ -62,16 +62,23 @@ impl Rows {
         self.dropped += other.dropped;
     }
 
-    /// Returns the counts as a sentence, or `None` if every row was used and no sample was bridged.
+    /// Returns the counts as a sentence, or `None` if every row was used and no sample was bridged. A row that the reader
+    /// left out is not counted, because the reader reports it.
     pub fn note(&self) -> Option<String> {
         let Self { read, bridged, dropped } = self;
-        (bridged + dropped > 0).then(|| {
+        let unused = (*dropped > 0).then(|| {
             format!(
-                "rows: {} of {read} used, {dropped} left out; {bridged} lost samples bridged, \
-                 measured channels by linear interpolation, commands by their last value",
-                read - dropped
+                "{dropped} of {read} rows are not used, because they lie in short parts between gaps"
             )
-        })
+        });
+        let lost = (*bridged > 0).then(|| {
+            let samples = if *bridged == 1 { "sample is" } else { "samples are" };
+            format!(
+                "{bridged} lost {samples} bridged, measured channels by linear interpolation, commands by their last value"
+            )
+        });
+        let all: Vec<String> = unused.into_iter().chain(lost).collect();
+        (!all.is_empty()).then(|| all.join("; "))
     }
 }
 

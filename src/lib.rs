@@ -88,12 +88,39 @@ const INTERRUPTED: u8 = 130;
 
 /// Returns the commands and options, for man pages and shell completions.
 pub fn command() -> clap::Command {
-    Cli::command()
+    with_paragraphs(Cli::command())
+}
+
+/// Joins the lines of each paragraph of a command's text, and of the commands below it, because clap
+/// breaks lines at the width of the terminal.
+fn with_paragraphs(mut command: clap::Command) -> clap::Command {
+    if let Some(text) = command.get_about().map(|text| paragraphs(&text.to_string())) {
+        command = command.about(text);
+    }
+    if let Some(text) = command.get_long_about().map(|text| paragraphs(&text.to_string())) {
+        command = command.long_about(text);
+    }
+    command.mut_subcommands(with_paragraphs)
+}
+
+/// Joins consecutive lines. Indented lines, which are examples, stay as they are.
+fn paragraphs(text: &str) -> String {
+    let is_prose = |line: &str| !line.is_empty() && !line.starts_with(' ');
+    let mut joined = String::new();
+    let mut continues = false;
+    for line in text.lines() {
+        if !joined.is_empty() {
+            joined.push(if continues && is_prose(line) { ' ' } else { '\n' });
+        }
+        joined += line;
+        continues = is_prose(line);
+    }
+    joined
 }
 
 /// Runs the program with the arguments of the process.
 pub fn run() -> ExitCode {
-    let mut command = Cli::command();
+    let mut command = command();
     let arguments = old_names::with_todays_names(std::env::args_os());
     let parsed = command.try_get_matches_from_mut(arguments).and_then(|matches| {
         let cli = Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))?;

@@ -196,7 +196,7 @@ fn a_reference_that_is_off_throughout_is_remarked_on_with_what_to_do() {
     };
     // In centimetres, and on a mount that has moved by 10 mm.
     for (name, change, off) in [
-        ("centimetres.csv", (|mm| mm / 10.0) as fn(f64) -> f64, "it is 148."),
+        ("centimetres.csv", (|mm| mm / 10.0) as fn(f64) -> f64, "it is 148 mm above"),
         ("moved.csv", |mm| mm + 10.0, "it is 10 mm below the reference on average"),
     ] {
         let told = told(&other(name, change));

@@ -159,7 +159,7 @@ fn several_references_get_a_record_each() {
         ["calibrate", "wrist.csv", "--reference", "bend_deg,turn_deg", "--out", "wrist.json"];
     let said = runs(scratch.sleeve(&asked).args(["--signal", "all"]));
     for (angle, column) in [("bend_deg", 4), ("turn_deg", 5)] {
-        assert!(said.contains(&format!("{angle} on s1, s2, s3: RMSE")), "{said}");
+        assert!(said.contains(&format!("{angle} on s1, s2, s3 is off by")), "{said}");
         let record = format!("wrist.{angle}.json");
         // 2 % of some 80 degrees, including errors beyond the ranges of the first recording.
         let (errors, _) = scratch.errors(&record, "later.csv", column);
@@ -246,7 +246,10 @@ fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
     });
     let (cut, said) = scratch.error("cal.json", "cut.csv");
     assert!(said.contains("s1 is left out from 40.00 s on: its signal is outside"), "{said}");
-    assert!(said.contains("outside the calibrated domain") && said.contains("2000 with a gauge left out"), "{said}");
+    assert!(
+        said.contains("outside the calibrated domain") && said.contains("2000 with a lost gauge"),
+        "{said}"
+    );
     assert!(whole < cut && cut < 20.0 * whole, "{cut} beside {whole}");
     let (k, stuck_at) = (std::cell::Cell::new(0), std::cell::Cell::new(0.0));
     scratch.worn("stuck.csv", worn, |row| {
@@ -257,7 +260,11 @@ fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
         row[1] = stuck_at.get();
     });
     let (stuck, said) = scratch.error("cal.json", "stuck.csv");
-    assert!(said.contains("s2 is left out from 40.") && said.contains("s on: its signal repeats one value"), "{said}");
+    assert!(
+        said.contains("s2 is left out from 40.")
+            && said.contains("s on: its signal repeats one value"),
+        "{said}"
+    );
     assert!(stuck < 20.0 * whole, "{stuck} beside {whole}");
     // A command for one gauge refuses several gauges.
     let evaluate = &mut scratch.sleeve(&["evaluate", "--calibration", "cal.json", "knee.csv"]);

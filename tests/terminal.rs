@@ -154,10 +154,22 @@ fn quiet_says_results_and_errors_and_verbose_says_how() {
     let ((usual, aside), (quiet, nothing), (_, verbose)) =
         (said(None), said(Some("--quiet")), said(Some("-v")));
     assert!(usual.contains("\nwrote ") && aside.is_empty(), "{usual}{aside}");
-    assert!(
-        quiet.contains("R^2") && !quiet.contains("wrote") && !quiet.contains("note:"),
-        "{quiet}"
-    );
+    // The sentence comes first, and at most fifteen lines follow. With -q, only the paths follow.
+    let sentence = "On the very data of the fit, poly13 is off by";
+    assert!(usual.starts_with(sentence) && usual.lines().count() <= 17, "{usual}");
+    assert!(one_line(&usual).contains("movements were found, and at least 8 are needed"), "{usual}");
+    assert!(quiet.starts_with(sentence) && quiet.contains("\nwrote "), "{quiet}");
+    assert!(!quiet.contains('|') && !quiet.contains("note:"), "{quiet}");
+    let judged = |flags: &[&str]| {
+        let mut command = stretch();
+        command.args(["evaluate", "--calibration"]).arg(scratch.path("cal.json")).arg(&trial);
+        prints(command.args(flags))
+    };
+    let (usual, quiet, all) = (judged(&[]), judged(&["-q"]), judged(&["-v"]));
+    assert!(quiet.starts_with("cal is off by") && quiet.lines().count() <= 2, "{quiet}");
+    assert!(usual.starts_with(&quiet) && usual.contains("Bias, mm"), "{usual}");
+    assert!(all.starts_with(&quiet) && all.contains("paired t test"), "{all}");
+    assert!(!usual.contains("paired t test") && usual.lines().count() <= 17, "{usual}");
     assert_eq!(nothing, "");
     for part in [" s] read a.csv: 2000 samples", " s] fitted poly13 to length_mm", " s] the end"] {
         assert!(verbose.contains(part), "{part}: {verbose}");
@@ -186,7 +198,7 @@ fn no_line_is_wider_than_the_terminal_or_a_hundred_columns() {
     scratch.loops("a.csv", 20.0, 1.1);
     runs(&mut calibrate(&scratch.path("a.csv"), &scratch.path("cal.json")));
     let lines = [
-        "calibrate a.csv --model auto --out x.json",
+        "calibrate a.csv --model auto --out x.json -v",
         "evaluate --calibration cal.json a.csv",
         "diagnose bench --no-next -v",
         "diagnose plain --no-next",
@@ -271,6 +283,13 @@ fn commands_and_options_are_few_and_a_short_help_fits_a_screen() {
         "{} commands, {count} options: {counts:?}",
         counts.len()
     );
+    // A paragraph is one line, which clap breaks at the width of the terminal.
+    for text in commands.iter().filter_map(|command| command.get_long_about()) {
+        let text = text.to_string();
+        let is_prose = |line: &str| !line.is_empty() && !line.starts_with(' ');
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(!lines.windows(2).any(|w| is_prose(w[0]) && is_prose(w[1])), "{text}");
+    }
     let mut lines: Vec<Vec<&str>> = commands.iter().map(|c| vec![c.get_name()]).collect();
     lines.extend([vec!["sleeve", "learn"], vec!["sleeve", "renew"]]);
     for line in lines {

@@ -21,7 +21,7 @@ use super::{
     shared::RecordedInput,
 };
 use crate::{
-    display::{Output, warn},
+    display::{Output, detail, warn},
     table::number,
 };
 
@@ -308,18 +308,18 @@ impl ZeroWatch {
         self.last = Some(*zero);
     }
 
-    /// Reports at the end how far the zero was followed, or that the calibration cannot detect
-    /// shifts.
+    /// Reports at the end how far the zero was followed, or with `-v` that the calibration cannot
+    /// detect shifts, which `stretch calibrate` has said with the reason.
     fn end(&self) {
         let Some(turns) = self.turns else {
             // A calibration that needs only the signal, such as that of a load cell, may lack
             // movements.
-            if self.needs_signal_only {
-                return;
+            if !self.needs_signal_only {
+                detail(
+                    "the calibration file lacks the levels at which movements reverse, so a gauge that was put on again cannot be detected",
+                );
             }
-            return warn(
-                "the calibration file lacks the levels at which movements reverse, so a gauge that was put on again cannot be detected",
-            );
+            return;
         };
         if let Some(zero) = self.last.filter(|zero| zero.followed != 0.0) {
             let followed = number(zero.followed * turns.reference_per_signal);

@@ -57,7 +57,7 @@ fn report(applied: &AppliedArray) {
     let samples = applied.readings.len() as u64;
     let (estimated, clamped) = (count(&|_| true), count(&|reading| reading.clamped));
     warn(format!(
-        "{samples} samples: {} without an estimate, {clamped} outside the calibrated domain, {} with a gauge left out",
+        "{samples} samples: {} without an estimate, {clamped} outside the calibrated domain, {} with a lost gauge",
         samples - estimated,
         count(&|reading| reading.lost != 0)
     ));

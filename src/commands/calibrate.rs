@@ -11,8 +11,9 @@ use clap::ValueEnum;
 use serde::Deserialize;
 use stretch_calibrate::{
     CalibrateError, Calibrated, Candidate, MODELS_IN_WORDS, Memory, ModelChoice, ModelKind,
-    Options, Robust, SpellingError, calibrate, choose_model_watched, evaluate, evaluate_errors,
-    explains_little, explains_nothing, parse_rate, rank_signals, without_gross_errors,
+    Options, Robust, SpellingError, calibrate, choose_model_watched, copied_signals, evaluate,
+    evaluate_errors, explains_little, explains_nothing, parse_rate, rank_signals,
+    without_gross_errors,
 };
 use stretch_core::RateEstimator;
 use stretch_data::files::{Outputs, read_whole};
@@ -21,7 +22,7 @@ use stretch_gap::Diagnosis;
 use stretch_problem::{Causes, causes, name_of};
 use stretch_recording::{ReadOptions, RecordingError, tidy_column};
 use stretch_report::{Context, Judged, calibration_page, calibration_verdict};
-use stretch_sleeve::calibrate_gauge;
+use stretch_sleeve::{calibrate_gauge, missing_turns};
 
 use super::{
     calibrate_sleeve,
@@ -424,7 +425,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let mut calibrated = calibrate(&trials, &options).map_err(named)?;
     detail(format!("fitted {} to {} on {}", options.model, options.reference, options.signal));
-    calibrated.notes.splice(0..0, gross_errors);
+    let candidates: Vec<String> = ranking.iter().map(|signal| signal.signal.clone()).collect();
+    calibrated
+        .notes
+        .splice(0..0, gross_errors.into_iter().chain(copied_signals(&trials, &candidates)));
     match explains_nothing(&calibrated.fits) {
         Some(why) if args.force => {
             calibrated.notes.push(format!("{why}; written because of --force"))
@@ -439,7 +443,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     calibrated.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
     let mut outputs = Outputs::default();
     let gauge = calibrate_gauge(calibrated.calibration.clone(), &trials, &options);
-    let record = gauge.map_err(named)?.bytes(&args.out)?;
+    let gauge = gauge.map_err(named)?;
+    let record = gauge.bytes(&args.out)?;
+    if !is_table {
+        calibrated.notes.extend(missing_turns(&gauge, &trials));
+    }
     outputs.file(&args.out, |out| out.write_all(&record))?;
     let test = read_trials(&args.test, Split::Test, &columns)?;
     let judged = verdict(&calibrated, &trials, &test, &options);

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use serde::Serialize;
+use stretch_calibrate::copied_signals;
 use stretch_data::files::{Outputs, is_standard_output};
 use stretch_data::{Split, Trial, unit_of};
 use stretch_sleeve::{
@@ -82,7 +83,10 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         None => fit(&trials, &signals, reference, args.rest_length),
     };
     let made: Result<Vec<Made>, _> = references.iter().map(one).collect();
-    let made = made.map_err(of_trials)?;
+    let mut made = made.map_err(of_trials)?;
+    made.first_mut()
+        .into_iter()
+        .for_each(|made| made.notes.extend(copied_signals(&trials, &signals)));
     let mut outputs = Outputs::default();
     let records: Vec<PathBuf> = match &references[..] {
         [_] => vec![args.out.clone()],
@@ -193,7 +197,8 @@ fn blocks(made: &Made) -> Vec<String> {
     let mut blocks = Vec::new();
     if made.rmse.is_some() {
         let alone = format!("alone, RMSE {}", unit_of(&made.reference));
-        let header = ["channel", alone.trim_end(), "without it", "reduces MSE by"];
+        let channel = format!("channel for {}", made.reference);
+        let header = [channel.as_str(), alone.trim_end(), "without it", "reduces MSE by"];
         let row = |c: &Carried| {
             let adds = c.adds.map_or("-".to_owned(), |adds| format!("{:.0} %", 100.0 * adds));
             vec![c.signal.clone(), maybe(c.rmse_alone), maybe(c.rmse_without), adds]

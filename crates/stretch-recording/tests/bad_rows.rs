@@ -199,6 +199,9 @@ fn a_hole_beside_what_is_asked_for_costs_no_row() {
     assert_eq!((times.len(), live(&lines, &options).len()), (30, 30));
     assert_eq!(notes, ["columns left out because not all of their fields are numbers: length_mm"]);
     assert_eq!(read(&lines, &ReadOptions::new()).expect("29 rows").0.len(), 29);
+    let (times, notes) = read(&lines, &options.all_columns()).expect("29 rows");
+    assert_eq!((times.len(), notes.len()), (29, 1));
+    assert!(notes[0].starts_with("a row is left out: row 13, column length_mm"), "{notes:?}");
 }
 
 /// If samples are counted, a lost row counts as a sample.

@@ -17,6 +17,6 @@ pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate, 
 pub use left_out::{Judged, judge_model};
 pub use model_choice::{
     Candidate, ModelChoice, ModelRow, candidate_models, choose_among, choose_model,
-    choose_model_watched, m3_instructions, m3_instructions_fixed, rank_signals,
+    choose_model_watched, copied_signals, m3_instructions, m3_instructions_fixed, rank_signals,
 };
 pub use reach::Reach;

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use stretch_core::Degree;
 use stretch_data::{Trial, unit_of};
+use stretch_metrics::Agreement;
 
 use crate::{
     CalibrateError, Memory, ModelKind, Options,
@@ -376,6 +377,32 @@ pub fn rank_signals(
     }
 }
 
+/// Least correlation of two signals that are reported as copies.
+const COPY: f64 = 0.99999;
+/// Most rows of the first trial that are compared.
+const COMPARED: usize = 10_000;
+
+/// Returns a note for each pair of signals that are equal up to a factor and an offset.
+pub fn copied_signals(trials: &[Trial], names: &[String]) -> Vec<String> {
+    let signals: Vec<(&String, &[f64])> =
+        names.iter().filter_map(|name| Some((name, trials.first()?.channel(name)?))).collect();
+    let mut notes = Vec::new();
+    for (i, (first, a)) in signals.iter().enumerate() {
+        for (second, b) in &signals[i + 1..] {
+            let mut both = Agreement::<f64>::new();
+            for (x, y) in a.iter().zip(*b).take(COMPARED) {
+                both.push(*x, *y);
+            }
+            if both.correlation().is_some_and(|r| r.abs() > COPY) {
+                notes.push(format!(
+                    "{first} and {second} are equal up to a factor and an offset: is one of them a copy? If so, leave it out of --signal"
+                ));
+            }
+        }
+    }
+    notes
+}
+
 /// Returns the cross-validated error over both branches, weighted by samples.
 fn pooled(calibrated: &Calibrated) -> Option<f64> {
     let mut squares = 0.0;
@@ -390,7 +417,23 @@ fn pooled(calibrated: &Calibrated) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use stretch_data::Channel;
+
     use super::*;
+
+    #[test]
+    fn copied_signals_are_named() {
+        let values = |of: fn(f64) -> f64| (0..500).map(|n| of(0.05 * f64::from(n))).collect();
+        let channel = |name: &str, of| Channel { name: name.to_owned(), values: values(of) };
+        let channels = vec![
+            channel("s1", f64::sin),
+            channel("s2", |t| 3.0 - 2.0 * t.sin() + 1e-4 * (17.0 * t).cos()),
+            channel("s3", |t| t.sin() + 0.02 * (3.0 * t).cos()),
+        ];
+        let trial = Trial { name: String::new(), time_s: values(|t| t), channels };
+        let notes = copied_signals(&[trial], &["s1", "s2", "s3"].map(str::to_owned));
+        assert!(notes.len() == 1 && notes[0].starts_with("s1 and s2 are equal"), "{notes:?}");
+    }
 
     #[test]
     fn every_candidate_was_measured() {

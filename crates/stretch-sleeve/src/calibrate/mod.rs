@@ -16,7 +16,7 @@ mod turns;
 
 pub use array::{AppliedArray, ArrayFit, ArrayOptions, Carried, apply_array, calibrate_array};
 pub use error::SleeveError;
-pub use gauge::{AppliedGauge, LiveGauge, apply_gauge};
+pub use gauge::{AppliedGauge, LiveGauge, apply_gauge, missing_turns};
 pub use prior::{
     Assumed, ErrorSpread, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session,
     SessionOptions, UpdateOptions, UpdateSummary, Updated,

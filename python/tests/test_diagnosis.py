@@ -241,7 +241,7 @@ def test_a_fix_predicts_new_recordings_and_is_diagnosed_again():
     assert off[1] == pytest.approx(predicted.outputs[0]["rmse"], rel=0.05) and off[1] < 0.1 * off[0]
     for again in (fix.diagnose(), fix.diagnose(recording(FORCE[::-1].copy(), 2), rate_hz=RATE_HZ)):
         assert again.named == [] and again.verdict == "no_gap", again.sentence
-    with pytest.raises(stretch_gap.StretchError, match="there is no simulator to run"):
+    with pytest.raises(stretch_gap.StretchError, match="this fix cannot be run, because the diagnosis was read from text"):
         stretch_gap.Diagnosis.from_json(found.to_json()).fix().predict(recording(FORCE, 3))
 
 

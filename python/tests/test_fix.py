@@ -81,9 +81,9 @@ def test_a_wrong_call_says_what_to_do(found):
 
 def test_a_diagnosis_from_text_cannot_be_called(found):
     fix = stretch_gap.Diagnosis.from_json(found.to_json()).fix()
-    with pytest.raises(stretch_gap.StretchError, match="no simulator to run, because the diagnosis was read from text"):
+    with pytest.raises(stretch_gap.StretchError, match="cannot be run, because the diagnosis was read from text"):
         fix({}, {}, inputs=RECORDINGS[0], first=begun(RECORDINGS[0]))
-    with pytest.raises(stretch_gap.StretchError, match="no simulator to run"):
+    with pytest.raises(stretch_gap.StretchError, match="this fix cannot be run"):
         stretch_gap.diagnose(fix, RECORDINGS, **COLUMNS)
 
 
@@ -162,8 +162,49 @@ def test_a_fix_of_a_fix_has_the_effects_of_both():
     first = stretch_gap.diagnose(servo, tight, parameters={"tau": TAU}, **COLUMNS)
     again = first.fix().diagnose(RECORDINGS[1], rate_hz=RATE_HZ)
     assert (first.named, again.named) == (["input.delay"], ["output.backlash"])
-    fixed = again.fix()(inputs=RECORDINGS[1], first=begun(RECORDINGS[1]))
+    fix = again.fix()
+    fixed = fix(inputs=RECORDINGS[1], first=begun(RECORDINGS[1]))
     np.testing.assert_allclose(fixed, again.curves()["with_effects"], rtol=1e-9, atol=1e-9)
+    assert fix.effects == {**first.effects, **again.effects} and fix.parameters == again.parameters
+    pasted = {}
+    exec(fix.code, pasted)
+    assert pasted["parameters"] == again.parameters and {"input_delay", "output_backlash"} <= set(pasted)
+    third = fix.diagnose()
+    assert third.named == [] and third.fix().effects == fix.effects
+
+
+def test_a_fix_of_a_fix_keeps_effects_of_the_simulator():
+    def bent(params, effects):
+        return params["compliance"] * FORCE + effects["bend"] * FORCE**2
+
+    length = late(BENT - noise(FORCE.size)) + noise(FORCE.size)
+    first = diagnose(bent, length, wrap=None)
+    assert first.named[:1] == ["bend"]
+    fix = diagnose(bent, length).fix().diagnose().fix()
+    assert sorted(fix.effects) == ["bend", "output.delay"] and "bend = {" in fix.code
+    assert np.std(fix() - length) < 1.2 * np.std(noise(FORCE.size))
+
+
+def test_a_fix_without_an_effect_is_predicted_in_a_sentence():
+    def spring(params, effects, inputs):
+        return params["compliance"] * inputs["force_N"]
+
+    found = diagnose(spring, 2.1 * FORCE + noise(FORCE.size), effects=None)
+    assert found.verdict == "parameters"
+    predicted = found.fix().predict({"force_N": FORCE, "length_mm": 2.1 * FORCE + noise(FORCE.size, 1)}, rate_hz=RATE_HZ)
+    assert predicted.sentence.startswith("the fix has no effect, so only the re-tuned parameters were tested: the largest error")
+
+
+def test_a_fix_that_cannot_be_run_says_the_reason():
+    walk = 0.1 * np.cumsum(np.random.default_rng(0).normal(size=FORCE.size))
+    found = diagnose(Spring(), 2.1 * FORCE + walk, wrap=["output.backlash"])
+    assert found.verdict == "unknown", found.sentence
+    fix = found.fix()
+    for run in (fix, fix.diagnose, lambda: fix.predict({"force_N": FORCE, "length_mm": FORCE}, rate_hz=RATE_HZ)):
+        with pytest.raises(
+            stretch_gap.StretchError, match="cannot be run, because the verdict is 'unknown': the diagnosis names"
+        ):
+            run()
 
 
 def test_the_simulator_of_a_problem_file_cannot_be_called(problem_file):  # noqa: F811

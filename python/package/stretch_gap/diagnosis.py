@@ -39,6 +39,7 @@ class Diagnosis:
         experiment: Mapping[str, Array] | None = None,
         session: Mapping[str, Any] | None = None,
         again: Again | None = None,
+        earlier: Fix | None = None,
     ) -> None:
         self._answer = answer
         self._page = page
@@ -47,6 +48,7 @@ class Diagnosis:
         self._experiment = experiment
         self._session = session or {}
         self._again = again
+        self._earlier = earlier
 
     @staticmethod
     def from_json(text: str) -> Diagnosis:
@@ -306,9 +308,22 @@ class Diagnosis:
         Fix
             Re-tuned parameters, values of the named effects, and both as Python code. The fix is called in place of the
             simulator. `Fix.predict` predicts new recordings, and `Fix.diagnose` diagnoses the fixed simulator. If the diagnosis
-            was read from text, the code contains equations instead of functions, and the fix cannot be run.
+            was read from text, the code contains equations instead of functions, and the fix cannot be run. If the fixed
+            simulator was diagnosed, the effects of the earlier fix come first.
         """
-        return fix(self.parameters, self.effects, self._answer.get("implement", []), self._functions, self._again)
+        implement = self._answer.get("implement", [])
+        return fix(self.parameters, self.effects, implement, self._functions, self._again, self._why_not(), self._earlier)
+
+    def _why_not(self) -> str:
+        """Return the reason why the fix cannot be run, if it cannot."""
+        if not self._session:
+            return "the diagnosis was read from text, which does not contain the simulator; diagnose again"
+        if self.verdict == "record":
+            return "the recording is wrong, so nothing was fitted to it; correct the recording, and diagnose again"
+        return (
+            f"the verdict is {self.verdict!r}: the diagnosis names no effect and re-tunes no parameter; read the attributes "
+            "sentence and notes of the diagnosis, or examine more effects (arguments wrap and effects of diagnose)"
+        )
 
     def apply(self, spec: Any) -> list[str]:
         """Write the result into a MuJoCo specification, for a diagnosis of a `stretch_gap.mujoco.problem`.
@@ -655,7 +670,10 @@ def run(
     off: dict[str, float],
     earlier: Fix | None = None,
 ) -> Diagnosis:
-    """Diagnose a checked problem. `notes` precede the notes of the diagnosis. For `off` and `earlier` see `Again`."""
+    """Diagnose a checked problem. `notes` precede the notes of the diagnosis.
+
+    For `off` see `Again`. `earlier` is the fix that is in the problem.
+    """
     session = json.loads(checked.session)
     if asked is not None:
         asked.bind({**session, "columns": checked.columns})
@@ -663,8 +681,8 @@ def run(
         text, page, curves, functions, trial, fixed = checked.diagnose(asked, json.dumps(how), report)
     answer = json.loads(text)
     answer["notes"] = notes + answer["notes"]
-    again = None if fixed is None else Again(fixed, asked, how, session, off, earlier)
-    return Diagnosis(answer, page, curves, functions, trial, session, again)
+    again = None if fixed is None else Again(fixed, asked, how, session, off)
+    return Diagnosis(answer, page, curves, functions, trial, session, again, earlier)
 
 
 def wrappers() -> Any:

@@ -25,7 +25,7 @@ class Again:
     """Inputs of a run of the fixed simulator.
 
     `fixed` is the fixed problem, `asked` the user's simulator, `how` the options and `session` the session of the diagnosis.
-    `off` holds the values at which the simulator's own effects do nothing. `earlier` is the fix that was diagnosed again.
+    `off` holds the values at which the simulator's own effects do nothing.
     """
 
     fixed: Fixed
@@ -33,7 +33,6 @@ class Again:
     how: dict[str, Any]
     session: dict[str, Any]
     off: dict[str, float]
-    earlier: Fix | None = None
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,7 @@ class Fix:
     parameters : dict of str to float
         Values of all nominal parameters, re-tuned together with the named effects.
     effects : dict of str to dict of str to float
-        Values of the named effects, by effect and argument.
+        Values of the named effects, by effect and argument. A fix of a fixed simulator also has the effects of the earlier fix.
     code : str
         The same as Python code to paste into the simulator: the parameters, a function for each effect around the simulator,
         and the values of each effect that the simulator itself implements.
@@ -58,6 +57,7 @@ class Fix:
     code: str
     _again: Again | None = field(default=None, repr=False)
     _written: tuple[Sequence[Mapping[str, Any]], Mapping[str, str]] = field(default=((), {}), repr=False)
+    _why_not: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         asked = self._again and self._again.asked
@@ -89,8 +89,8 @@ class Fix:
         ------
         StretchError
             If an effect cannot be applied from outside the simulator, because it depends on more than the column that it alters.
-            If there is no simulator to run, because the diagnosis was read from text, names no effect, or ran the simulator of a
-            `problem.toml`. If an argument is unknown or missing.
+            If the fix cannot be run, because the diagnosis was read from text, has the verdict `"unknown"` or `"record"`, or ran
+            the simulator of a `problem.toml`. If an argument is unknown or missing.
 
         Examples
         --------
@@ -125,12 +125,11 @@ class Fix:
                 raise StretchError(f"{one.name} alters {one.columns[0]}, but there are no inputs; give the argument inputs")
             if one.is_in_front:
                 named["inputs"] = one.act(named["inputs"], spans)
-        call = again.earlier or asked.call
         if asked.many:
             models = next((len(table) for table in (params, effects) if not isinstance(table, (Mapping, NoneType))), 1)
-            answer = call(_table(values, asked.parameters, models), _table(own, asked.effects, models), **named)
+            answer = asked.call(_table(values, asked.parameters, models), _table(own, asked.effects, models), **named)
         else:
-            answer = call(values, own, **named)
+            answer = asked.call(values, own, **named)
         outputs = answer if isinstance(answer, dict) else {again.session["stages"][named.get("stage", 0)]["output"]: answer}
         for one in self._around:
             if not one.is_in_front:
@@ -190,8 +189,8 @@ class Fix:
         Raises
         ------
         StretchError
-            If there is no simulator to run, because the diagnosis was read from text or names no effect, or if the recordings
-            are wrong.
+            If the fix cannot be run, because the diagnosis was read from text or has the verdict `"unknown"` or `"record"`, or if
+            the recordings are wrong.
         """
         again = self._runnable()
         fitted, begins_s = again.fixed.fitted
@@ -232,8 +231,8 @@ class Fix:
         Raises
         ------
         StretchError
-            If there is no simulator to run, because the diagnosis was read from text or names no effect, or if the recordings
-            are wrong.
+            If the fix cannot be run, because the diagnosis was read from text or has the verdict `"unknown"` or `"record"`, or if
+            the recordings are wrong.
         """
         from .diagnosis import run
 
@@ -244,9 +243,7 @@ class Fix:
 
     def _runnable(self) -> Again:
         if self._again is None:
-            raise StretchError(
-                "there is no simulator to run, because the diagnosis was read from text or names no effect; diagnose again"
-            )
+            raise StretchError(f"this fix cannot be run, because {self._why_not}")
         return self._again
 
     def _repr_html_(self) -> str:
@@ -266,9 +263,15 @@ class Prediction:
 
     def __init__(self, text: str, sentence: str, curves: Mapping[str, Sequence[Array]], dt_s: float) -> None:
         self._answer: dict[str, Any] = json.loads(text)
-        self.sentence = sentence
+        self.sentence = sentence if self._answer["effects"] else self._without_effects()
         self._curves = curves
         self._dt_s = dt_s
+
+    def _without_effects(self) -> str:
+        return (
+            "the fix has no effect, so only the re-tuned parameters were tested: the largest error of the simulator is "
+            f"{self.times_noise:.1f} times the noise"
+        )
 
     @property
     def ratio(self) -> float:
@@ -386,11 +389,17 @@ def fix(
     implement: Sequence[Mapping[str, Any]],
     functions: Mapping[str, str],
     again: Again | None,
+    why_not: str,
+    earlier: Fix | None,
 ) -> Fix:
     """Return the fix.
 
-    `found` holds the values of the named effects, `implement` their descriptions, and `functions` their code.
+    `found` holds the values of the named effects, `implement` their descriptions, and `functions` their code. `why_not` is the
+    reason why the fix cannot be run, if `again` is None. `earlier` is the fix that was diagnosed again; its effects act too.
     """
+    if earlier:
+        found = {**earlier.effects, **found}
+        implement, functions = [*earlier._written[0], *implement], {**earlier._written[1], **functions}
     described = {one["effect"]: one for one in implement}
     lines = ["# parameters, re-tuned together with the named effects", "parameters = {"]
     lines += [f"    {name!r}: {value!r}," for name, value in parameters.items()]
@@ -402,4 +411,4 @@ def fix(
         one = described.get(name, {})
         words = [f"{name}: {one.get('words', '')}", f"  {one.get('equation', '')}"]
         lines += ["", *map(comment, words), f"{identifier(name)} = {values!r}"]
-    return Fix(dict(parameters), dict(found), "\n".join(lines) + "\n", again, (implement, functions))
+    return Fix(dict(parameters), dict(found), "\n".join(lines) + "\n", again, (implement, functions), why_not)

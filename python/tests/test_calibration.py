@@ -103,7 +103,7 @@ def test_a_sample_without_a_number_is_left_out_as_in_a_file(fitted, tmp_path, sp
     signal, angle = fitted
     time_s = np.arange(signal.size) / RATE_HZ
     broken = np.where(np.arange(signal.size) == 700, spoilt, signal)
-    with pytest.warns(stretch_gap.DoubtWarning, match=r"1 of 2000 samples are left out \(700\)") as warned:
+    with pytest.warns(stretch_gap.DoubtWarning, match=r"1 of 2000 samples count as lost \(700\)") as warned:
         one = stretch_gap.calibrate(broken, angle, RATE_HZ, model="linear")
     assert warned[0].message.code == "missing_samples" and warned[0].filename == __file__
     path = tmp_path / "log.csv"

@@ -86,6 +86,19 @@ def test_a_recording_is_named_by_its_path(bent, tmp_path):
         assert found.effects["bend"]["bend"] == pytest.approx(bent.effects["bend"]["bend"], rel=1e-6)
 
 
+def test_a_missing_number_in_a_file_is_warned_of(tmp_path):
+    time_s = np.arange(FORCE.size) / RATE_HZ
+    broken = np.where(np.arange(BENT.size) == 1000, np.nan, BENT)
+    text, packed = tmp_path / "day1.csv", tmp_path / "day1.npz"
+    columns = np.column_stack([time_s, FORCE, broken])
+    np.savetxt(text, columns, delimiter=",", header="time_s,force_N,length_mm", comments="")
+    np.savez(packed, time_s=time_s, force_N=FORCE, length_mm=broken)
+    for data in (text, packed, stretch_gap.read(text)):
+        with pytest.warns(stretch_gap.DoubtWarning, match=r"day1\.\w+: .*left out.*; such samples count as lost"):
+            stretch_gap.diagnose(Spring(), data, output="length_mm", inputs="force_N", effects={"bend": (-0.05, 0.05)},
+                                 parameters={"compliance": (2.0, 0.2)}, wrap=None)  # fmt: skip
+
+
 def test_one_input_may_be_given_by_its_name(bent):
     found = diagnose(Spring(), BENT, inputs="force_N")
     assert found.sentence == bent.sentence
@@ -96,9 +109,11 @@ def test_one_input_may_be_given_by_its_name(bent):
 
 def test_a_missing_sample_is_bridged_with_a_warning():
     broken = np.where(np.arange(BENT.size) == 1000, np.nan, BENT)
-    with pytest.warns(stretch_gap.DoubtWarning, match=r"sample 1000 of length_mm is nan"):
+    with pytest.warns(
+        stretch_gap.DoubtWarning, match=r"1 of 6000 samples count as lost \(1000\): sample 1000 of length_mm is nan"
+    ):
         found = diagnose(Spring(), broken)
-    assert found.named == ["bend"]
+    assert found.named == ["bend"] and any("0 left out; 1 lost samples bridged" in note for note in found.notes)
 
 
 def test_an_effect_of_the_users_own_is_named_with_its_value(bent):
@@ -351,7 +366,8 @@ def test_values_that_are_refused_turn_the_fit_back():
         (lambda length: [None] + [[1.0]] * 5999, "returned no numbers"),
         (lambda length: np.ma.masked_array(length, np.arange(length.size) == 50), r"gave NaN at 0\.5 s of trial"),
         (lambda length: {"width_mm": length}, "returned no length_mm; it returned width_mm"),
-        (lambda length: None, "returned"),
+        (lambda length: None, "the simulator returned None; is a return statement missing"),
+        (lambda length: {"length_mm": None}, "the simulator returned None for length_mm; is a return"),
     ],
 )
 def test_answers_that_are_none_say_what_was_expected(answer, words):
@@ -364,12 +380,36 @@ def test_answers_that_are_none_say_what_was_expected(answer, words):
     [
         ({"output": "width_mm"}, "there is no column width_mm; the columns are force_N, length_mm"),
         ({"output": None}, "give either output, the name of the measured column, or stages"),
+        ({"output": "lenght_mm"}, r"no column lenght_mm \(did you mean length_mm\?\); the columns are force_N, length_mm"),
         ({"wrap": ["output.backlsh"]}, "did you mean output.backlash"),
+        ({"wrap": "backlash"}, r"wrap: backlash has no place; did you mean output\.backlash\?"),
+        ({"wrap": ["backlsh"]}, r"did you mean output\.backlash\?"),
+        ({"wrap": 5}, "wrap is 5; give a name, or a list of names"),
+        ({"units": {"foo": "N"}}, "units: there is no column foo; the columns are force_N, length_mm"),
+        ({"noise": {"lenght_mm": 0.1}}, r"noise: there is no column lenght_mm \(did you mean length_mm"),
+        ({"noise": {"length_mm": "0.1"}}, "noise of length_mm is '0.1'; give a finite number"),
+        ({"budget": "many"}, "budget is 'many'; give a whole number of at least 1"),
+        ({"seed": 1.5}, "seed is 1.5; give a whole number"),
         ({"wrap": ["input.delay"]}, "must take the argument inputs"),
         ({"effects": {"bend": 0.3}}, "effect bend is 0.3; give"),
         ({"effects": {"bend": (0.05, -0.05)}}, "the range 0.05 to -0.05 is empty"),
         ({"parameters": {"compliance": stretch_gap.Parameter(0.0, relative=0.1)}}, "give an absolute tolerance"),
-        ({"rate_hz": None}, "give either rate_hz"),
+        ({"effects": {"bend": (0.05, "x")}}, "effect bend: the greatest value is 'x'; give a finite number"),
+        ({"effects": {"bend": (1,)}}, r"effect bend is \(1,\); give \(least, greatest\)"),
+        ({"effects": "backlash"}, r"effects is a str; give a dict by name, such as effects=\{.* belong in wrap"),
+        ({"effects": ["bend"]}, "effects is a list; give a dict by name"),
+        ({"parameters": [2.0]}, r"parameters is a list; give a dict by name, such as parameters=\{.mass.: stretch_gap.Parameter"),
+        ({"parameters": {"compliance": "2"}}, "parameter compliance: the value is '2'; give a finite number"),
+        (
+            {"parameters": {"compliance": (1.0, 2.0, 3.0)}},
+            r"parameter compliance is \(1.0, 2.0, 3.0\); give \(value, tolerance\)",
+        ),
+        ({"parameters": {"compliance": (2.0, -1.0)}}, "parameter compliance: the tolerance is -1; give one standard deviation"),
+        ({"parameters": {"compliance": stretch_gap.Parameter(2.0, relative=10)}}, "compliance: relative is 10, that is, 1000 %"),
+        (
+            {"rate_hz": None},
+            r"the recording: there is no time: none of its columns \(force_N, length_mm\) is called time_s, t or",
+        ),
     ],
 )
 def test_bad_questions_are_refused_in_a_sentence(more, words):
@@ -377,6 +417,69 @@ def test_bad_questions_are_refused_in_a_sentence(more, words):
         diagnose(Spring(), BENT, **more)
     with pytest.raises(stretch_gap.StretchError, match="give an object with a method simulate"):
         diagnose(3, BENT)
+
+
+def test_columns_of_two_lengths_are_named():
+    data = {"force_N": FORCE, "length_mm": BENT[:-5]}
+    words = "force_N of the recording has 6000 samples, but length_mm has 5995"
+    with pytest.raises(stretch_gap.StretchError, match=words):
+        stretch_gap.diagnose(Spring(), data, output="length_mm", inputs="force_N", rate_hz=RATE_HZ)
+
+
+def test_a_path_without_an_output_gets_an_example(tmp_path):
+    path = tmp_path / "day1.csv"
+    columns = np.column_stack([np.arange(100) / RATE_HZ, FORCE[:100], BENT[:100]])
+    np.savetxt(path, columns, delimiter=",", header="time_s,force_N,length_mm", comments="")
+    words = r'diagnose\(simulator, .*day1.csv., output="length_mm", inputs=\["force_N"\], parameters='
+    with pytest.raises(stretch_gap.StretchError, match=words):
+        stretch_gap.diagnose(Spring(), path)
+
+
+def test_a_column_t_is_the_time(bent):
+    data = {"t": np.arange(FORCE.size) / RATE_HZ, "force_N": FORCE, "length_mm": BENT}
+    question = {"output": "length_mm", "effects": {"bend": (-0.05, 0.05)}, "wrap": ["output.backlash", "output.delay"]}
+    parameters = {"compliance": stretch_gap.Parameter(2.0, relative=0.1, unit="mm/N")}
+    found = stretch_gap.diagnose(Spring(), data, inputs="force_N", parameters=parameters, **question)
+    assert found.sentence == bent.sentence
+
+
+@pytest.mark.parametrize(
+    ("more", "code", "words"),
+    [
+        ({"rate_hz": None, "scale": 1000.0}, "slow_clock", r"median step is 10 s .*; if the time stamps are in milliseconds"),
+        ({"parameters": {"compliance": (2.0, 3.0)}}, "large_tolerance", r"\(2, 3\) is read as the value 2 with the standard dev"),
+    ],
+)
+def test_doubtful_numbers_are_warned_of(more, code, words):
+    scale = more.pop("scale", 1.0)
+    data = {"force_N": FORCE, "length_mm": BENT}
+    if "rate_hz" in more:
+        data["time_s"] = scale * np.arange(FORCE.size) / RATE_HZ
+    question = {"output": "length_mm", "inputs": "force_N", "rate_hz": RATE_HZ, "budget": 3}
+    question["effects"] = {"bend": (-0.05, 0.05)}
+    with pytest.warns(stretch_gap.DoubtWarning, match=words) as warned:
+        try:
+            stretch_gap.diagnose(Spring(), data, **{"parameters": {"compliance": 2.0}, **question, **more})
+        except stretch_gap.StretchError as error:
+            assert "budget" in str(error)
+    assert warned[0].message.code == code and warned[0].filename == __file__
+
+
+def test_a_simulator_that_refuses_everything_is_told():
+    def spring(params, effects):
+        raise stretch_gap.Refused("no convergence")
+
+    with pytest.raises(stretch_gap.StretchError, match="refused every request, the nominal values included: no convergence"):
+        diagnose(spring, BENT)
+
+
+def test_inputs_are_changed_in_a_copy_only():
+    def spring(params, effects, inputs):
+        inputs["force_N"] *= params["compliance"]
+        return inputs["force_N"] + effects["bend"]
+
+    with pytest.raises(stretch_gap.StretchError, match=r'inputs are read-only .*; change a copy, as in inputs\["COLUMN"\]'):
+        diagnose(spring, BENT)
 
 
 def test_a_dead_column_is_told_and_no_effect_is_blamed():

@@ -71,9 +71,10 @@ def test_no_gap_is_left(found):
 def test_a_wrong_call_says_what_to_do(found):
     fix = found.fix()
     for given, words in [
-        ({"params": {"tua": 0.1}}, "there is no parameter tua; there are tau"),
+        ({"params": {"tua": 0.1}}, r"there is no parameter tua \(did you mean tau\?\); the parameters are tau"),
         ({"effects": {"bend": 0.1}}, "there is no effect bend; there are none"),
         ({"first": {"angle_deg": 0.0}}, r"input\.delay alters cmd_deg, but there are no inputs; give the argument inputs"),
+        ({"inputs": {"foo": [0.0]}, "first": {"angle_deg": 0.0}}, "inputs: there is no column cmd_deg; the columns are foo"),
     ]:
         with pytest.raises(stretch_gap.StretchError, match=words):
             fix(**given)
@@ -183,6 +184,16 @@ def test_a_fix_of_a_fix_keeps_effects_of_the_simulator():
     fix = diagnose(bent, length).fix().diagnose().fix()
     assert sorted(fix.effects) == ["bend", "output.delay"] and "bend = {" in fix.code
     assert np.std(fix() - length) < 1.2 * np.std(noise(FORCE.size))
+
+
+def test_a_column_that_the_simulator_misses_is_named():
+    def spring(params, effects, inputs):
+        return params["compliance"] * inputs["force_N"]
+
+    found = diagnose(spring, late(2.1 * FORCE) + noise(FORCE.size), effects=None, wrap=["output.delay"])
+    assert found.named == ["output.delay"]
+    with pytest.raises(stretch_gap.StretchError, match=r"inputs: there is no column force_N \(did you mean force\?\)"):
+        found.fix()(inputs={"force": FORCE})
 
 
 def test_a_fix_without_an_effect_is_predicted_in_a_sentence():

@@ -268,7 +268,7 @@ class Calibration:
                     "pressure is missing: the gauge of this calibration depends on it; give pressure in kPa"
                 )
             pressures = column(pressure, "pressure")
-            same_length(pressures, values.size, "pressure")
+            same_length(pressures, values.size, "pressure", "signal")
         answer = self._record.apply(stamps, values, pressures)
         doubt(answer["doubts"])
         faults = {key: answer[key] for key in ("missing", "jittered", "backwards")}
@@ -399,7 +399,7 @@ def calibrate(
 ) -> Calibration:
     """Fit a calibration to recordings of a signal and its reference.
 
-    Give either `rate_hz` or `time_s`. Samples without a number in every column are left out with a warning.
+    Give either `rate_hz` or `time_s`. Samples without a number in every column count as lost, with a warning.
 
     Parameters
     ----------
@@ -470,7 +470,8 @@ def calibrate(
     Warns
     -----
     DoubtWarning
-        If samples are left out because a column has no number there (code `missing_samples`).
+        If samples count as lost because a column has no number there (code `missing_samples`), or if the time stamps seem to be
+        in milliseconds (code `slow_clock`).
 
     Examples
     --------

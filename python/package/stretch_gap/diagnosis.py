@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import json
 import os
 import textwrap
@@ -11,11 +12,11 @@ from typing import Any
 
 from . import _stretch, figures, html, timeline
 from . import problem as entries
-from ._stretch import StretchError
+from ._stretch import Refused, StretchError
 from .fix import Again, Fix, fix
 from .frames import frame
 from .outputs import replaceable
-from .recordings import Array
+from .recordings import Array, unknown
 from .simulator import Asked
 
 SHOWN = 5
@@ -577,7 +578,8 @@ def diagnose(
     Warns
     -----
     DoubtWarning
-        If samples are left out because a column has no number there (code `missing_samples`).
+        If samples count as lost because a column has no number there (code `missing_samples`), if the time stamps seem to be in
+        milliseconds (`slow_clock`), or if a tuple of a parameter may be a range (`large_tolerance`).
 
     Examples
     --------
@@ -605,8 +607,8 @@ def diagnose(
     >>> round(found.effects["output.delay"]["delay_s"], 3), round(found.parameters["compliance"], 2)
     (0.06, 2.1)
     """
-    if depth < 1:
-        raise StretchError(f"depth is {depth}, the largest number of effects that may be named; give 1 or more")
+    if depth == 0:
+        raise StretchError("depth is 0, the largest number of effects that may be named; give 1 or more")
     asked = None if simulator is None else Asked(simulator)
     notes: list[str] = []
     off: list[float] = []
@@ -620,44 +622,72 @@ def diagnose(
             raise StretchError(
                 "there is no simulator, because simulator is None; give one, or give the path of a problem.toml as data"
             )
+        trials = entries.trials(data, rate_hz)
         if (output is None) == (stages is None):
-            raise StretchError("give either output, the name of the measured column, or stages")
+            raise StretchError(f"give either output, the name of the measured column, or stages{_example(data, trials)}")
         listed = list(stages or [entries.Stage(str(output), inputs, velocity=velocity, position=position)])
-        units, noise = units or {}, noise or {}
-        driven = list(dict.fromkeys(c for one in listed for c in one.inputs))
-        wrappers = [wrap] if isinstance(wrap, str) else list(wrap or ())
-        if not asked.takes_inputs:
-            wrappers, noise_in = _behind(wrappers, driven, notes), {}
-        else:
-            noise_in = dict(noise)
-        own = [entries.effect(key, value) for key, value in (effects or {}).items()]
+        columns = {column for trial in trials for column in trial.columns}
+        units = entries.by_name("units", units, '{"force": "N"}')
+        noise = entries.by_name("noise", noise, '{"length_mm": 0.1}')
+        noise = {column: entries.number(f"noise of {column}", value) for column, value in noise.items()}
+        wrappers = _wrappers(entries.texts("wrap", wrap), listed, asked, notes)
+        own = [entries.effect(key, value) for key, value in entries.by_name("effects", effects, EFFECTS).items()]
         off = [a["range"][0] if a["off"] is None else a["off"] for effect in own for a in effect["argument"]]
+        beside = entries.texts("beside", beside)
+        wanted = entries.wanted(listed, [*beside, *([reference] if reference else [])])
+        recorded = entries.recorded(trials, rate_hz, wanted)
+        for what, given in (("units", units), ("noise", noise)):
+            for column in given:
+                if column not in {*columns, *entries.CLOCKS}:
+                    raise unknown("column", column, sorted(columns), f"{what}: ")
         problem = {
             "stage": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
-            "input": [{"column": c, "unit": units.get(c, ""), "noise": float(noise_in.get(c, 0.0))} for c in driven],
-            "parameter": [entries.parameter(key, value) for key, value in (parameters or {}).items()],
+            "input": _inputs(listed, units, noise if asked.takes_inputs else {}),
+            "parameter": [
+                entries.parameter(key, value) for key, value in entries.by_name("parameters", parameters, PARAMETERS).items()
+            ],
             "effect": own,
             "wrap": wrappers,
-            "without": list(without),
-            "beside": list(beside),
+            "without": entries.texts("without", without),
+            "beside": beside,
             "reference": reference,
             "signal": (output or listed[-1].output) if reference else None,
         }
-        wanted = entries.wanted(listed, [*beside, *([reference] if reference else [])])
-        checked = _stretch.Problem(json.dumps(problem), entries.recorded(data, rate_hz, wanted))
+        checked = _stretch.Problem(json.dumps(problem), recorded)
     how = {
         "name": name,
-        "depth": depth,
-        "seed": seed,
-        "threads": threads,
+        "depth": entries.whole("depth", depth, 1),
+        "seed": entries.whole("seed", seed, 0),
+        "threads": entries.whole("threads", threads, 0),
         "baselines": False,
-        "budget": budget,
+        "budget": None if budget is None else entries.whole("budget", budget, 1),
         "batch": 1 if asked is None else asked.batch,
         "answers_all": asked is not None and asked.answers_all,
         "takes_inputs": asked is None or asked.takes_inputs,
         "experiment": experiment,
     }
     return run(checked, asked, how, progress, notes, off=dict(zip(json.loads(checked.session)["effects"], off)))
+
+
+EFFECTS = '{"friction": (0.0, 5.0)}, with the least and the greatest value; effects around the simulator belong in wrap'
+PARAMETERS = '{"mass": stretch_gap.Parameter(10.0, relative=0.1)}'
+
+
+def _example(data: Any, trials: Sequence[entries.Trial]) -> str:
+    """Return an example of a call with the columns of the recording, for a message."""
+    columns = [str(column) for column in trials[0].columns if column not in entries.CLOCKS] if trials else []
+    if not columns:
+        return ""
+    shown = repr(os.fspath(data)) if isinstance(data, (str, os.PathLike)) else "data"
+    driven = f', inputs=["{columns[0]}"]' if len(columns) > 1 else ""
+    call = f'stretch_gap.diagnose(simulator, {shown}, output="{columns[-1]}"{driven}, parameters={PARAMETERS})'
+    return f"; the columns are {', '.join(columns)}, so an example is {call}"
+
+
+def _inputs(stages: Sequence[entries.Stage], units: Mapping[str, str], noise: Mapping[str, float]) -> list[dict[str, Any]]:
+    """Return the inputs of all stages in the form of the native module."""
+    driven = dict.fromkeys(column for one in stages for column in one.inputs)
+    return [{"column": c, "unit": units.get(c, ""), "noise": noise.get(c, 0.0)} for c in driven]
 
 
 def run(
@@ -678,7 +708,15 @@ def run(
     if asked is not None:
         asked.bind({**session, "columns": checked.columns})
     with figures.shown(progress) as report:
-        text, page, curves, functions, trial, fixed = checked.diagnose(asked, json.dumps(how), report)
+        try:
+            text, page, curves, functions, trial, fixed = checked.diagnose(asked, json.dumps(how), report)
+        except StretchError as error:
+            if asked is None or asked.answers or not isinstance(asked.refusal, Refused):
+                raise
+            raise StretchError(
+                f"the simulator refused every request, the nominal values included: {error}; raise stretch_gap.Refused only for "
+                "values that cannot be simulated"
+            ) from asked.refusal
     answer = json.loads(text)
     answer["notes"] = notes + answer["notes"]
     again = None if fixed is None else Again(fixed, asked, how, session, off)
@@ -707,15 +745,26 @@ def wrappers() -> Any:
     return frame([dict(zip(keys, one)) for one in _stretch.wrappers()])
 
 
-def _behind(wrappers: list[str], driven: list[str], notes: list[str]) -> list[str]:
-    """Return the wrappers at the outputs, for a simulator that does not take altered inputs. Wrappers at inputs are refused."""
-    sides = ("input", *driven)
-    for one in wrappers:
+def _wrappers(names: list[str], stages: Sequence[entries.Stage], asked: Asked, notes: list[str]) -> list[str]:
+    """Return the wrappers to examine. Wrappers at inputs are refused if the simulator does not take altered inputs."""
+    driven = list(dict.fromkeys(column for one in stages for column in one.inputs))
+    sides = [] if asked.takes_inputs else ["input", *driven]
+    places = (
+        [one.output for one in stages] if len(stages) > 1 else ["input", "output"][0 if asked.takes_inputs and driven else 1 :]
+    )
+    kinds = [kind for kind, *_ in _stretch.wrappers()]
+    for one in names:
+        kind = next(iter(difflib.get_close_matches(one, kinds, 1)), "") if "." not in one and one != "all" else ""
+        if kind:
+            named = " or ".join(f"{place}.{kind}" for place in places)
+            raise StretchError(f"wrap: {one} has no place; did you mean {named}? wrap='all' examines all usual effects")
         if one.split(".", 1)[0] in sides:
             raise StretchError(
                 f"wrap: {one} alters an input, so the simulator must take the argument inputs, as in simulate(params, effects, "
                 "inputs); add this argument, or leave the wrapper out"
             )
-    if "all" in wrappers and driven:
+    if asked.takes_inputs:
+        return names
+    if "all" in names and driven:
         notes.append("effects at the inputs were not examined, because the simulator does not take the argument inputs")
-    return ["output.all" if one == "all" else one for one in wrappers]
+    return ["output.all" if one == "all" else one for one in names]

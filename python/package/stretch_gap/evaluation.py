@@ -104,7 +104,7 @@ def evaluate(
 ) -> Evaluation:
     """Compute the errors of calibrations on recordings that were not fitted.
 
-    Give either `rate_hz` or `time_s`. Samples without a number in every column are left out with a warning.
+    Give either `rate_hz` or `time_s`. Samples without a number in every column count as lost, with a warning.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def evaluate(
     DoubtWarning
         If there are reasons to doubt the errors: another sample rate or unit, a constant signal, many samples outside the
         fitted range, recordings that were fitted, a constant error, errors worse than those of the mean, or a constant
-        reference. Also if samples are left out.
+        reference. Also if samples count as lost, or if the time stamps seem to be in milliseconds.
 
     Examples
     --------

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._stretch import StretchError
+from .recordings import unknown
 
 Array = NDArray[np.float64]
 
@@ -19,7 +20,7 @@ def output_of(curves: Mapping[str, Any], output: str | None) -> str:
     """Return the name of the output that is asked for: by default the first one. Raise an error if there is no such output."""
     name = output or next(iter(curves))
     if name not in curves:
-        raise StretchError(f"there is no output {name}; the outputs are {', '.join(curves)}")
+        raise unknown("output", name, curves)
     return name
 
 

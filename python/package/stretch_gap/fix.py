@@ -16,7 +16,7 @@ from . import figures, html
 from . import problem as entries
 from ._stretch import Fixed, StretchError, comment, identifier
 from .around import Around, around
-from .recordings import Array
+from .recordings import Array, unknown
 from .simulator import Asked, Named
 
 
@@ -124,12 +124,21 @@ class Fix:
             if one.is_in_front and "inputs" not in named:
                 raise StretchError(f"{one.name} alters {one.columns[0]}, but there are no inputs; give the argument inputs")
             if one.is_in_front:
+                if one.columns[0] not in named["inputs"]:
+                    raise unknown("column", one.columns[0], named["inputs"], "inputs: ")
                 named["inputs"] = one.act(named["inputs"], spans)
         if asked.many:
             models = next((len(table) for table in (params, effects) if not isinstance(table, (Mapping, NoneType))), 1)
-            answer = asked.call(_table(values, asked.parameters, models), _table(own, asked.effects, models), **named)
+            given: tuple[Any, Any] = (_table(values, asked.parameters, models), _table(own, asked.effects, models))
         else:
-            answer = asked.call(values, own, **named)
+            given = (values, own)
+        try:
+            answer = asked.called(*given, **named)
+        except KeyError as error:
+            missing = error.args[0] if error.args else None
+            if missing in asked.columns and missing not in named.get("inputs", {missing}):
+                raise unknown("column", missing, named["inputs"], "inputs: ") from error
+            raise
         outputs = answer if isinstance(answer, dict) else {again.session["stages"][named.get("stage", 0)]["output"]: answer}
         for one in self._around:
             if not one.is_in_front:
@@ -373,7 +382,7 @@ def _by_name(what: str, given: Any, names: Sequence[str]) -> dict[str, Any]:
         given = dict(zip(getattr(given, "names", names), np.asarray(given).T))
     for name in given:
         if name not in names:
-            raise StretchError(f"there is no {what} {name}; there are {', '.join(names) or 'none'}")
+            raise unknown(what, name, names)
     return dict(given)
 
 

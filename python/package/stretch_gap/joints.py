@@ -48,10 +48,7 @@ def trials(recording: entries.Data, rate_hz: float | None) -> list[entries.Trial
     made = []
     for trial in entries.trials(recording, rate_hz):
         columns = dict(trial.columns)
-        time_s = columns.pop("time_s", None) if trial.time_s is None and trial.rate_hz is None else trial.time_s
-        rate = None if time_s is not None else trial.rate_hz or rate_hz
-        if time_s is None and rate is None:
-            raise StretchError("the recording has no column time_s; give rate_hz, the sample rate")
+        rate, time_s = entries.clock(trial.name or "the recording", columns, trial, rate_hz)
         made.append(entries.Trial(columns, rate_hz=rate, time_s=time_s, name=trial.name, test=trial.test, start_s=trial.start_s))
     if not made:
         raise StretchError("recording is empty; give at least one recording")

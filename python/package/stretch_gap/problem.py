@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Union
@@ -12,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ._stretch import StretchError
 from .reading import Recording, read
-from .recordings import column, same_length, times, without_missing
+from .recordings import column, doubt, same_length, times, unknown, without_missing
 
 
 @dataclass(frozen=True)
@@ -194,6 +196,9 @@ def trials(data: Data, rate_hz: float | None) -> list[Trial]:
     columns = dict(data)
     time_s = columns.pop("time_s", None)
     name = data.name if isinstance(data, Recording) else ""
+    notes = data.notes if isinstance(data, Recording) else []
+    lost = [note for note in notes if re.search(r"\brows?\b.* (is|are) left out", note)]
+    doubt(("missing_samples", f"{name}: {note}; such samples count as lost") for note in lost)
     return [Trial(columns, rate_hz=None if time_s is not None else rate_hz, time_s=time_s, name=name)]
 
 
@@ -213,18 +218,14 @@ def recorded(data: Data, rate_hz: float | None, wanted: Iterable[str]) -> list[t
                 'Trial(stretch_gap.read("day1.csv"))'
             )
         held = dict(trial.columns)
-        stamps = trial.time_s
-        if stamps is None and trial.rate_hz is None:
-            stamps = held.pop("time_s", None)
+        rate, stamps = clock(name, held, trial, rate_hz, wanted)
         missing = [c for c in wanted if c not in held]
         if missing:
-            there = ", ".join(map(str, held)) or "none"
-            raise StretchError(f"{name}: there is no column {missing[0]}; the columns are {there}")
+            raise unknown("column", missing[0], held, f"{name}: ")
         channels = [(c, column(held[c], f"{c} of {name}")) for c in wanted]
         samples = channels[0][1].size
         for c, values in channels:
-            same_length(values, samples, f"{c} of {name}")
-        rate = None if stamps is not None else trial.rate_hz or rate_hz
+            same_length(values, samples, f"{c} of {name}", wanted[0])
         time_s, channels = without_missing(name, times(samples, rate, stamps, name), channels)
         start_s = begins_s if trial.start_s is None else trial.start_s
         begins_s = start_s + float(time_s[-1] - time_s[0] if samples else 0.0) + PAUSE_S
@@ -236,21 +237,109 @@ PAUSE_S = 15.0
 """Pause that is assumed before a recording without a start time, s."""
 
 
+CLOCKS = ("time_s", "t", "time")
+"""Columns that are the time in seconds, if neither time stamps nor a rate are given. The reader of files takes them as well."""
+
+
+def clock(
+    name: str, held: dict[str, Any], trial: Trial, rate_hz: float | None, kept: Sequence[str] = ()
+) -> tuple[float | None, ArrayLike | None]:
+    """Return the sample rate of a recording, or else its time stamps. A column with the time is removed from `held`.
+
+    The columns in `kept` are not the time.
+    """
+    rate = trial.rate_hz or rate_hz
+    stamps = trial.time_s
+    if stamps is None and trial.rate_hz is None:
+        known = [c for c in (CLOCKS[:1] if rate else CLOCKS) if c in held and c not in kept]
+        stamps = held.pop(known[0]) if known else None
+    if stamps is None and rate is None:
+        raise StretchError(
+            f"{name}: there is no time: none of its columns ({', '.join(map(str, held)) or 'it has none'}) is called "
+            f"{', '.join(CLOCKS[:-1])} or {CLOCKS[-1]}; add the time in seconds as time_s, or give rate_hz, the sample rate"
+        )
+    return (rate, None) if stamps is None else (None, stamps)
+
+
+def number(what: str, given: Any) -> float:
+    """Return a finite number that the user gave. Text is refused."""
+    try:
+        if not isinstance(given, (str, bytes)) and np.isfinite(float(given)):
+            return float(given)
+    except (TypeError, ValueError):
+        pass
+    raise StretchError(f"{what} is {given!r}; give a finite number")
+
+
+def whole(what: str, given: Any, least: int) -> int:
+    """Return a whole number that the user gave."""
+    try:
+        if operator.index(given) >= least:
+            return operator.index(given)
+    except TypeError:
+        pass
+    raise StretchError(f"{what} is {given!r}; give a whole number of at least {least}")
+
+
+def by_name(what: str, given: Any, example: str) -> dict[str, Any]:
+    """Return values by name that the user gave. None means that there are none."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise StretchError(f"{what} is a {type(given).__name__}; give a dict by name, such as {what}={example}")
+    return dict(given)
+
+
+def texts(what: str, given: Any) -> list[str]:
+    """Return names that the user gave: one, several, or None."""
+    names = [given] if isinstance(given, str) else [] if given is None else given
+    if isinstance(names, Mapping) or not isinstance(names, Iterable) or not all(isinstance(name, str) for name in names):
+        raise StretchError(f"{what} is {given!r}; give a name, or a list of names")
+    return list(names)
+
+
 def parameter(name: str, given: ParameterLike) -> dict[str, Any]:
     """Return a parameter in the form of the native module. A tuple is `(value, tolerance)`, and a number is exact."""
+    what = f"parameter {name}"
+    is_tuple = isinstance(given, tuple)
     if isinstance(given, tuple):
+        if len(given) != 2:
+            raise StretchError(
+                f"{what} is {given!r}; give (value, tolerance), where the tolerance is one standard deviation, or a "
+                "stretch_gap.Parameter, which also takes least and greatest"
+            )
         given = Parameter(*given)
     elif not isinstance(given, Parameter):
-        given = Parameter(float(given))
-    share = None if given.relative is None else f"{100.0 * given.relative!r} %"
+        given = Parameter(given)
+    value = number(f"{what}: the value", given.value)
+    least, greatest, tolerance, share = (
+        None if one is None else number(f"{what}: {key}", one)
+        for key, one in [
+            ("least", given.least),
+            ("greatest", given.greatest),
+            ("the tolerance", given.tolerance),
+            ("relative", given.relative),
+        ]
+    )
+    if tolerance is not None and tolerance < 0.0:
+        raise StretchError(f"{what}: the tolerance is {tolerance:g}; give one standard deviation, which is not below 0")
+    if tolerance is None and share is not None and not 0.0 <= share <= 1.0:
+        raise StretchError(
+            f"{what}: relative is {share:g}, that is, {100.0 * share:g} % of the value; give a share from 0 to 1 (0.1 is 10 %), "
+            "or the argument tolerance in the unit of the parameter"
+        )
+    if is_tuple and tolerance is not None and tolerance > abs(value) > 0.0:
+        words = f"{what}: ({value:g}, {tolerance:g}) is read as the value {value:g} with the standard deviation {tolerance:g}"
+        instead = "if it is a range, give Parameter(VALUE, tolerance=..., least=..., greatest=...)"
+        doubt([("large_tolerance", f"{words}; {instead}")])
     return {
         "name": name,
         "unit": given.unit,
-        "value": float(given.value),
-        "tolerance": share if given.tolerance is None else float(given.tolerance),
-        "least": given.least,
-        "greatest": given.greatest,
-        "stages": list(given.stages),
+        "value": value,
+        "tolerance": f"{100.0 * share!r} %" if tolerance is None and share is not None else tolerance,
+        "least": least,
+        "greatest": greatest,
+        "stages": texts(f"{what}: stages", given.stages),
     }
 
 
@@ -259,20 +348,33 @@ def effect(name: str, given: EffectLike) -> dict[str, Any]:
 
     A tuple is the range of one argument, with its value `off` if it is not 0.
     """
-    if isinstance(given, tuple):
+    what = f"effect {name}"
+    if isinstance(given, tuple) and len(given) in (2, 3):
         given = Argument(*given)
     if isinstance(given, Argument):
         given = Effect({name: given})
     if not isinstance(given, Effect):
         raise StretchError(
-            f"effect {name} is {given!r}; give (least, greatest), (least, greatest, off), a stretch_gap.Argument, "
+            f"{what} is {given!r}; give (least, greatest), (least, greatest, off), a stretch_gap.Argument, "
             "or a stretch_gap.Effect"
         )
-    arguments = [
-        {"name": key, "unit": a.unit, "range": [float(a.min), float(a.max)], "off": a.off, "log": a.log}
-        for key, a in given.arguments.items()
-    ]
-    return {"name": name, "argument": arguments, "stages": list(given.stages), "twins": list(given.twins)}
+    stages, twins = texts(f"{what}: stages", given.stages), texts(f"{what}: twins", given.twins)
+    arguments = [_argument(what, key, one) for key, one in by_name("arguments", given.arguments, ARGUMENTS).items()]
+    return {"name": name, "argument": arguments, "stages": stages, "twins": twins}
+
+
+ARGUMENTS = '{"gain": stretch_gap.Argument(0.0, 2.0)}'
+
+
+def _argument(what: str, name: str, given: Any) -> dict[str, Any]:
+    """Return an argument of an effect in the form of the native module."""
+    if not isinstance(given, Argument):
+        raise StretchError(f"{what}: the argument {name} is {given!r}; give a stretch_gap.Argument")
+    least, greatest = number(f"{what}: the least value", given.min), number(f"{what}: the greatest value", given.max)
+    if not least < greatest:
+        raise StretchError(f"{what}: the range {least:g} to {greatest:g} is empty; give the least value first")
+    off = None if given.off is None else number(f"{what}: off", given.off)
+    return {"name": name, "unit": given.unit, "range": [least, greatest], "off": off, "log": given.log}
 
 
 def stage(given: Stage, index: int, units: Mapping[str, str], noise: Mapping[str, float]) -> dict[str, Any]:
@@ -282,7 +384,7 @@ def stage(given: Stage, index: int, units: Mapping[str, str], noise: Mapping[str
         "output": given.output,
         "unit": given.unit or units.get(given.output, ""),
         "inputs": list(given.inputs),
-        "noise": given.noise if given.noise is not None else noise.get(given.output),
+        "noise": noise.get(given.output) if given.noise is None else number(f"noise of {given.output}", given.noise),
         "velocity": given.velocity,
         "position": given.position,
     }

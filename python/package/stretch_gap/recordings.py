@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+import sys
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -22,8 +24,9 @@ class DoubtWarning(UserWarning):
     text : str
         Sentence for the user.
     code : str
-        Name of the reason for programs. It is stable between releases: `missing_samples`, `other_rate`, `other_unit`,
-        `constant_signal`, `outside_range`, `fitted_trials`, `constant_error`, `worse_than_the_mean` or `constant_reference`.
+        Name of the reason for programs. It is stable between releases: `missing_samples`, `slow_clock`, `large_tolerance`,
+        `other_rate`, `other_unit`, `constant_signal`, `outside_range`, `fitted_trials`, `constant_error`,
+        `worse_than_the_mean` or `constant_reference`.
 
     Attributes
     ----------
@@ -42,10 +45,22 @@ class DoubtWarning(UserWarning):
         self.code = code
 
 
-def doubt(doubts: Iterable[tuple[str, str]], stacklevel: int = 3) -> None:
-    """Issue a `DoubtWarning` for each pair of code and sentence. `stacklevel` must point to the line of the user's call."""
+def doubt(doubts: Iterable[tuple[str, str]]) -> None:
+    """Issue a `DoubtWarning` for each pair of code and sentence, at the line that called this package."""
+    level, caller = 2, sys._getframe(1)
+    while caller.f_globals.get("__package__") == __package__ and caller.f_back:
+        level, caller = level + 1, caller.f_back
     for code, text in doubts:
-        warnings.warn(DoubtWarning(text, code), stacklevel=stacklevel)
+        warnings.warn(DoubtWarning(text, code), stacklevel=level)
+
+
+def unknown(what: str, name: Any, names: Iterable[str], where: str = "") -> StretchError:
+    """Return the error that there is no `name`, with the most similar name and with all names. `what` is its kind."""
+    known = list(map(str, names))
+    similar = difflib.get_close_matches(str(name), known, 1)
+    hint = f" (did you mean {similar[0]}?)" if similar else ""
+    there = f"the {what}s are {', '.join(known)}" if known else "there are none"
+    return StretchError(f"{where}there is no {what} {name}{hint}; {there}")
 
 
 def column(values: ArrayLike, what: str) -> Array:
@@ -59,10 +74,16 @@ def column(values: ArrayLike, what: str) -> Array:
     return array
 
 
+SLOW_S = 1.0
+"""Longest plausible step of time stamps, s. Longer steps are probably milliseconds."""
+SLOW_HZ, LONG = 5.0, 1000
+"""Lowest plausible sample rate of a recording with more than `LONG` samples."""
+
+
 def without_missing(what: str, time_s: Array, channels: Sequence[tuple[str, Array]]) -> tuple[Array, list[tuple[str, Array]]]:
     """Return the samples in which every channel has a number, as the reader of files does.
 
-    A `DoubtWarning` lists the other samples.
+    The others count as lost samples, which the resampling bridges or treats as a gap. A `DoubtWarning` lists them.
     """
     present = np.logical_and.reduce([np.isfinite(values) for _, values in channels], initial=np.True_)
     left_out = np.flatnonzero(~present)
@@ -73,8 +94,8 @@ def without_missing(what: str, time_s: Array, channels: Sequence[tuple[str, Arra
     if left_out.size == time_s.size:
         raise StretchError(f"{what}: no sample has a number in every column; {name} is {value} in sample {first}")
     some = ", ".join(map(str, left_out[:5])) + (", ..." if left_out.size > 5 else "")
-    words = f"{what}: {left_out.size} of {time_s.size} samples are left out ({some}): sample {first} of {name} is {value}"
-    doubt([("missing_samples", words)], stacklevel=5)
+    words = f"{what}: {left_out.size} of {time_s.size} samples count as lost ({some}): sample {first} of {name} is {value}"
+    doubt([("missing_samples", words)])
     return time_s[present], [(name, values[present]) for name, values in channels]
 
 
@@ -93,7 +114,7 @@ def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: s
         # The difference must be taken before the conversion to numbers, because the unit is lost there.
         time_s = (given - given.flat[0]) / np.timedelta64(1, "s")
     stamps = column(time_s, f"time_s of {what}")
-    same_length(stamps, samples, f"time_s of {what}")
+    same_length(stamps, samples, f"time_s of {what}", "columns")
     wrong = np.flatnonzero(~np.isfinite(stamps))
     if wrong.size:
         raise StretchError(f"time_s of {what}, sample {wrong[0]}: {stamps[wrong[0]]} is not a time; leave this sample out")
@@ -104,13 +125,18 @@ def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: s
             f"time_s of {what}, sample {i}: {stamps[i]} s does not come after {stamps[i - 1]} s; sort the samples, or give "
             "several recordings as a list"
         )
+    step_s = float(np.median(np.diff(stamps))) if samples > 1 and given.dtype.kind not in "mM" else 0.0
+    if step_s > SLOW_S or (samples > LONG and step_s > 1.0 / SLOW_HZ):
+        words = f"time_s of {what}: the median step is {step_s:.4g} s ({1.0 / step_s:.4g} samples per second)"
+        doubt([("slow_clock", f"{words}; if the time stamps are in milliseconds, divide them by 1000")])
     return stamps
 
 
-def same_length(array: Array, samples: int, what: str) -> None:
-    """Raise a `StretchError` if a column does not have the given number of samples."""
+def same_length(array: Array, samples: int, what: str, other: str) -> None:
+    """Raise a `StretchError` if a column does not have as many samples as the `other` one, which has `samples`."""
     if array.size != samples:
-        raise StretchError(f"{what} has {array.size} samples, but the recording has {samples}; give one value for each sample")
+        has = "have" if other == "columns" else "has"
+        raise StretchError(f"{what} has {array.size} samples, but {other} {has} {samples}; give one value for each sample")
 
 
 def is_many(values: Any) -> bool:
@@ -150,7 +176,7 @@ def recordings(
         channels = [(key, column(values[i], f"{key} of {name}")) for key, values in given.items()]
         samples = channels[0][1].size
         for key, one in channels[1:]:
-            same_length(one, samples, f"{key} of {name}")
+            same_length(one, samples, f"{key} of {name}", first_name)
         kept, channels = without_missing(name, times(samples, rate_hz, stamps[i], name), channels)
         made.append({"name": name, "time_s": kept, "channels": channels})
     return made

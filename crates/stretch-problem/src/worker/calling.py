@@ -92,6 +92,8 @@ class Asked:
                 "f(params, effects) -> [samples]"
             )
         self.simulator = simulator
+        self.answers = 0  # calls that returned something
+        self.refusal: ValueError | None = None  # the last one that the simulator raised
         self.call: Callable[..., Any] = method if self.many else simulator  # type: ignore[assignment]
         self.batch = max(1, int(getattr(simulator, "batch", BATCH))) if self.many else 1
         self.optional = self._optional()
@@ -147,6 +149,21 @@ class Asked:
         if callable(begin):
             begin(session)
 
+    def called(self, *args: Any, **more: Any) -> Any:
+        """Call the simulator, and return its answer."""
+        try:
+            answer = self.call(*args, **more)
+        except ValueError as error:
+            self.refusal = error
+            if type(error) is ValueError and "read-only" in str(error) and "inputs" in more:
+                raise StretchError(
+                    f"the simulator changes inputs in place, but inputs are read-only ({error}); "
+                    'change a copy, as in inputs["COLUMN"].copy()'
+                ) from error
+            raise
+        self.answers += 1
+        return answer
+
     def samples(self, trials: int) -> int:
         """Return the number of samples of the first `trials` trials."""
         return int(self.spans[trials - 1].samples.stop) if trials else 0
@@ -197,14 +214,14 @@ class Asked:
         models = params.shape[0]
         if self.many:
             given = more if inputs is None else {**more, "inputs": inputs}
-            answer = self.call(Named.of(params, self.parameters), Named.of(effects, self.effects), **given)
+            answer = self.called(Named.of(params, self.parameters), Named.of(effects, self.effects), **given)
             return self._tables(answer, models, samples, outputs)
         rows = []
         for model in range(models):
             one = dict(zip(self.parameters, params[model].tolist()))
             values = dict(zip(self.effects, effects[model].tolist()))
             own = {} if inputs is None else {"inputs": {name: columns[model] for name, columns in inputs.items()}}
-            answer = self.call(one, values, **more, **own)
+            answer = self.called(one, values, **more, **own)
             rows.append(self._tables(_first_axis(answer), 1, samples, outputs))
         return [np.concatenate(tables) for tables in zip(*rows)]
 
@@ -257,6 +274,8 @@ def _first_axis(answer: Any) -> Any:
 
 def _numbers(values: Any, what: str = "") -> Array:
     """Return an answer as an array of floats. Masked samples become NaN. Complex numbers, times and text are refused."""
+    if values is None:
+        raise StretchError(f"the simulator returned None{what}; is a return statement missing?")
     kinds = {"c": "complex numbers", "m": "durations", "M": "times", "U": "text", "S": "text"}
     try:
         if np.ma.isMaskedArray(values):

@@ -1,5 +1,7 @@
 import importlib.util
 import json
+import re
+import sys
 
 import numpy as np
 import pytest
@@ -138,7 +140,8 @@ def test_what_was_found_is_shown_as_text_table_page_and_code(bent, tmp_path):
     page = bent.report(tmp_path / "d.html")
     assert page.startswith("<!DOCTYPE html>") and page.count("<svg") > 3
     assert (tmp_path / "d.html").read_text(encoding="utf-8") == page
-    assert "<iframe srcdoc=" in bent._repr_html_() and "<iframe" not in again._repr_html_()
+    assert "<iframe srcdoc=" in bent._repr_html_() and "scrollHeight" in bent._repr_html_()
+    assert "<iframe" not in again._repr_html_()
     found = {}
     exec(bent.fix().code, found)  # what a user would paste
     assert found["parameters"] == bent.parameters and found["bend"] == bent.effects["bend"]
@@ -485,6 +488,42 @@ def test_inputs_are_changed_in_a_copy_only():
 def test_a_dead_column_is_told_and_no_effect_is_blamed():
     with pytest.raises(stretch_gap.StretchError, match="dead"):
         diagnose(Spring(), np.zeros_like(BENT))
+
+
+@pytest.mark.parametrize("budget", [None, 300])
+def test_a_notebook_shows_the_number_of_model_runs(budget, monkeypatch, capsys):
+    pytest.importorskip("tqdm")
+    monkeypatch.setitem(sys.modules, "ipykernel", sys)
+    monkeypatch.setattr("tqdm.auto.tqdm", importlib.import_module("tqdm").tqdm)
+    found = diagnose(Spring(), BENT, budget=budget)
+    shown = capsys.readouterr().err.splitlines()[-1].split("\r")[-1]
+    runs = int(re.fullmatch(r"[^\d]* (\d+) (?:of at most 300 )?model runs, .*", shown).group(1))
+    assert abs(runs - found.model_runs) <= 2, (shown, found.model_runs)
+    assert ("█" in shown and f"of at most {budget}" in shown) if budget else "█" not in shown
+
+
+def test_a_fast_or_jumping_experiment_has_notes():
+    slow = 20 * np.sin(0.3 * np.arange(3000) / RATE_HZ) + 10 * np.sin(0.5 * np.arange(3000) / RATE_HZ)
+
+    def spring(params, effects, inputs):
+        return params["compliance"] * inputs["force_N"]
+
+    late = np.interp(np.arange(3000) - 5.0, np.arange(3000), 2.1 * slow) + 15 * noise(3000)
+    found = stretch_gap.diagnose(
+        spring,
+        {"force_N": slow, "length_mm": late},
+        output="length_mm",
+        inputs="force_N",
+        rate_hz=RATE_HZ,
+        parameters={"compliance": (2.0, 0.2)},
+        wrap=["input.delay", "output.delay", "output.lag", "output.skew"],
+        experiment=True,
+    )
+    assert found.next_experiment, found.sentence
+    fast, jump = found.next_experiment["notes"]
+    assert fast.startswith("next experiment: force_N changes by up to ") and "only by 11 N/s in the recordings" in fast
+    assert jump.startswith("next experiment: force_N begins at ") and "but at 0 N in the recordings" in jump
+    assert {fast, jump} <= set(found.notes)
 
 
 def test_progress_is_told_and_may_stop_it():

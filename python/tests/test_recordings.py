@@ -6,6 +6,7 @@ import importlib
 import json
 import subprocess
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -80,6 +81,18 @@ def test_text_in_any_dialect_is_a_dict_of_columns(tmp_path):
         parameters={"offset": stretch_gap.Parameter(217.0, 5.0)},
     )
     assert found.sentence
+
+
+def test_a_spreadsheet_is_refused_as_one(tmp_path):
+    for name, member in (("real.xlsx", "xl/workbook.xml"), ("real.ods", "content.xml")):
+        with zipfile.ZipFile(tmp_path / name, "w") as archive:
+            archive.writestr(member, "<x/>")
+    (tmp_path / "real.xls").write_bytes(bytes.fromhex("d0cf11e0a1b11ae1") + bytes(600))
+    for path in sorted(tmp_path.iterdir()):
+        with pytest.raises(
+            stretch_gap.StretchError, match=r"real\.\w+: this spreadsheet cannot be read: .*; save the table as CSV"
+        ):
+            stretch_gap.read(path)
 
 
 def test_arrays_of_numpy_have_their_clocks(tmp_path):

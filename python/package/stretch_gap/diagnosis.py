@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
+import numpy as np
+
 from . import _stretch, figures, html, timeline
 from . import problem as entries
 from ._stretch import Refused, StretchError
@@ -220,7 +222,8 @@ class Diagnosis:
 
         The experiment is searched only if `diagnose` is called with `experiment=True`. The dict holds among others `name`,
         `why` (a sentence that describes the experiment), `minutes` (its duration), `separates` (the effects that it
-        distinguishes) and `columns` (a dict of arrays with the commands and `time_s`).
+        distinguishes), `columns` (a dict of arrays with the commands and `time_s`) and `notes` (sentences on commands that are
+        much faster than the recorded ones, or that begin with a jump).
         """
         found = self._answer.get("next_experiment")
         return {**found, "columns": dict(self._experiment or {})} if found else None
@@ -443,8 +446,10 @@ class Diagnosis:
     def _repr_html_(self) -> str:
         sentence = f"<p><b>{escape(self.sentence)}</b></p>"
         if self._page:
-            # An iframe keeps the styles of the page and of the notebook apart.
-            return f'{sentence}<iframe srcdoc="{escape(self._page)}" style="width:100%;height:40em;border:0"></iframe>'
+            # An iframe keeps the styles of the page and of the notebook apart. It takes the height of its content.
+            fit = "this.style.height=this.contentDocument.documentElement.scrollHeight+'px'"
+            style = "width:100%;height:40em;border:0"
+            return f'{sentence}<iframe srcdoc="{escape(self._page)}" style="{style}" onload="{fit}"></iframe>'
         rows = [[name, f"{p:.3f}"] for name, p in self.probabilities.items()]
         return sentence + html.table(["candidate", "probability"], rows) + html.notes(self.notes)
 
@@ -560,7 +565,7 @@ def diagnose(
         Name of the problem in the report. A `problem.toml` provides the default.
     progress : callable, optional
         Function that is called with a short text at each step. An exception that it raises ends the diagnosis. By default a
-        notebook shows a progress bar if tqdm is installed.
+        notebook shows the progress if tqdm is installed.
 
     Returns
     -------
@@ -707,7 +712,7 @@ def run(
     session = json.loads(checked.session)
     if asked is not None:
         asked.bind({**session, "columns": checked.columns})
-    with figures.shown(progress) as report:
+    with figures.shown(progress, asked, how["budget"]) as report:
         try:
             text, page, curves, functions, trial, fixed = checked.diagnose(asked, json.dumps(how), report)
         except StretchError as error:
@@ -719,8 +724,42 @@ def run(
             ) from asked.refusal
     answer = json.loads(text)
     answer["notes"] = notes + answer["notes"]
+    if trial is not None and answer.get("next_experiment"):
+        answer["next_experiment"]["notes"] = _fast(trial, checked.columns, session)
+        answer["notes"] += answer["next_experiment"]["notes"]
     again = None if fixed is None else Again(fixed, asked, how, session, off)
     return Diagnosis(answer, page, curves, functions, trial, session, again, earlier)
+
+
+def _fast(experiment: Mapping[str, Array], columns: Mapping[str, Array], session: Mapping[str, Any]) -> list[str]:
+    """Return notes on commands of an experiment that are much faster than the recorded ones, or that begin with a jump."""
+    notes = []
+    ends = np.cumsum([trial["samples"] for trial in session["trials"]])[:-1]
+    step_s = float(np.median(np.diff(experiment["time_s"])))
+    for name in experiment:
+        if name not in columns:
+            continue
+        trials, proposed, unit = np.split(columns[name], ends), experiment[name], _stretch.unit_of(name)
+        rate = float(np.max(np.abs(np.diff(proposed)), initial=0.0) / step_s)
+        seen = float(max(np.max(np.abs(np.diff(one)), initial=0.0) for one in trials) / session["dt_s"])
+        if rate > FAST * seen:
+            notes.append(
+                f"next experiment: {name} changes by up to {rate:.3g} {unit}/s, but only by {seen:.3g} {unit}/s in the recordings"
+                "; check that the machine can follow, or play the commands more slowly"
+            )
+        begins = min((float(one[0]) for one in trials if one.size), key=lambda x: abs(x - proposed[0]))
+        if abs(begins - proposed[0]) > JUMP * np.ptp(columns[name]):
+            notes.append(
+                f"next experiment: {name} begins at {proposed[0]:.3g} {unit}, but at {begins:.3g} {unit} in the recordings; move "
+                "there slowly before the experiment"
+            )
+    return notes
+
+
+FAST = 2.0
+"""Largest ratio of the rate of a proposed command to the rate in the recordings without a note."""
+JUMP = 0.05
+"""Largest jump at the start of a proposed command without a note, as a share of the recorded range."""
 
 
 def wrappers() -> Any:

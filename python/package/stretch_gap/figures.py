@@ -1,7 +1,8 @@
-"""Figures with matplotlib, and the progress bar of a notebook."""
+"""Figures with matplotlib, and the progress that a notebook shows."""
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from ._stretch import StretchError
 from .recordings import unknown
+from .simulator import Asked
 
 Array = NDArray[np.float64]
 
@@ -47,10 +49,13 @@ def draw(values: Mapping[str, Array], dt_s: float, output: str, title: str) -> A
 
 
 @contextmanager
-def shown(progress: Callable[[str], Any] | None) -> Iterator[Callable[[str], Any] | None]:
+def shown(
+    progress: Callable[[str], Any] | None, asked: Asked | None, budget: int | None = None
+) -> Iterator[Callable[[str], Any] | None]:
     """Yield the function that is called with progress messages.
 
-    Without a function of the user, a notebook shows a progress bar if tqdm is installed.
+    Without a function of the user, a notebook shows the step, the number of model runs and the elapsed time if tqdm is installed.
+    Only with a budget of runs is the total known, and a bar shown.
     """
     if progress is not None or "ipykernel" not in sys.modules:
         yield progress
@@ -60,5 +65,13 @@ def shown(progress: Callable[[str], Any] | None) -> Iterator[Callable[[str], Any
     except ImportError:
         yield None
         return
-    with tqdm(bar_format="{desc} {elapsed}") as bar:
-        yield bar.set_description_str
+    runs = "{n_fmt} of at most {total_fmt} model runs" if budget else "{n_fmt} model runs"
+    with tqdm(total=budget, bar_format="{desc}: " + "{bar} " * bool(budget) + runs + ", {elapsed}") as bar:
+        if asked is None:
+            yield bar.set_description_str
+            return
+        asked.counted = bar.update
+        try:  # the bar counts the runs itself, also between two steps
+            yield lambda words: bar.set_description_str(re.sub(r" \(\d+ model runs\)$", "", words))
+        finally:
+            asked.counted = None

@@ -187,7 +187,7 @@ class Fix:
         rate_hz : float, optional
             Sample rate in Hz of recordings that have neither `time_s` nor a rate.
         progress : callable, optional
-            Function that is called with a short text at each step. By default a notebook shows a progress bar if tqdm is
+            Function that is called with a short text at each step. By default a notebook shows the progress if tqdm is
             installed.
 
         Returns
@@ -209,7 +209,7 @@ class Fix:
         session = json.loads(checked.session)
         if again.asked is not None:
             again.asked.bind({**session, "columns": checked.columns})
-        with figures.shown(progress) as report:
+        with figures.shown(progress, again.asked) as report:
             made = checked.predict(fitted, again.asked, json.dumps(again.how), report)
         return Prediction(*made, dt_s=float(session["dt_s"]))
 
@@ -229,7 +229,7 @@ class Fix:
         rate_hz : float, optional
             Sample rate in Hz of recordings that have neither `time_s` nor a rate.
         progress : callable, optional
-            Function that is called with a short text at each step. By default a notebook shows a progress bar if tqdm is
+            Function that is called with a short text at each step. By default a notebook shows the progress if tqdm is
             installed.
 
         Returns

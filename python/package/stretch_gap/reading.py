@@ -35,6 +35,7 @@ READERS: tuple[tuple[int, bytes, Callable[[Path, Arrays], None]], ...] = (
     (0, b"PAR1", tables.read_parquet),
     (0, b"\x93NUMPY", tables.read_numpy),
     (0, b"PK\x03\x04", tables.read_numpy),
+    (0, b"\xd0\xcf\x11\xe0", tables.read_spreadsheet),
 )
 """Offset and bytes by which a format is recognised, and the reader of the format."""
 

@@ -28,6 +28,8 @@ def read_numpy(path: Path, found: Arrays) -> None:
             found.take("" if held.dtype.names else "column_0", held)
             return
         names = held.files
+        if any(name.startswith("xl/") or name == "content.xml" for name in names):
+            read_spreadsheet(path, found)
     except (OSError, ValueError, EOFError) as error:
         raise found.cannot("NumPy file", error, "save it again with numpy.savez") from error
     with held:
@@ -36,6 +38,11 @@ def read_numpy(path: Path, found: Arrays) -> None:
                 found.take(name, held[name])
             except ValueError as error:
                 found.leave(name, str(error))
+
+
+def read_spreadsheet(path: Path, found: Arrays) -> None:
+    """Refuse a file of Excel or LibreOffice."""
+    raise found.cannot("spreadsheet", "its format is that of Excel or LibreOffice", "save the table as CSV, and read that file")
 
 
 def read_parquet(path: Path, found: Arrays) -> None:

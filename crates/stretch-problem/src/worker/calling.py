@@ -93,6 +93,7 @@ class Asked:
             )
         self.simulator = simulator
         self.answers = 0  # calls that returned something
+        self.counted: Callable[[int], Any] | None = None  # called with the number of models of each call
         self.refusal: ValueError | None = None  # the last one that the simulator raised
         self.call: Callable[..., Any] = method if self.many else simulator  # type: ignore[assignment]
         self.batch = max(1, int(getattr(simulator, "batch", BATCH))) if self.many else 1
@@ -183,6 +184,8 @@ class Asked:
         each with the number of the stage and of the input.
         """
         models, samples = params.shape[0], self.samples(trials)
+        if self.counted:
+            self.counted(models)
         rows_by_name = dict(zip(self.inputs[stage], altered or ()))
         rows_by_name.update((self.inputs[other][at], rows) for other, at, rows in others)
         inputs = self._inputs(samples, models, rows_by_name)

@@ -68,7 +68,7 @@ class Fix:
         """Run the fixed simulator: the user's simulator with the re-tuned parameters, and the named effects around it.
 
         A fix is called as the user's simulator is: if that is an object with a method `simulate`, so is the fix. `diagnose` takes
-        a fix as its simulator, but `Fix.diagnose` is faster. The sample time must be that of the diagnosis. An effect around the
+        a fix as its simulator, but `Fix.diagnose` is faster, and only its fix also lists the effects of this one. The sample time must be that of the diagnosis. An effect around the
         simulator begins at rest in each recording, at the first value of its column.
 
         Parameters

@@ -8,7 +8,9 @@ create_exception!(
     stretch_gap,
     StretchError,
     PyValueError,
-    "What is wrong with the data or the question, and what to do about it, in a sentence."
+    "Error in the data or in the arguments.
+
+The message is one sentence that names the wrong value and says what to do."
 );
 
 /// Returns an exception with the error's sentence.

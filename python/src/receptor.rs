@@ -4,19 +4,28 @@ use pyo3::{prelude::*, types::PyDict};
 use stretch_calibrate::LiveReceptor;
 use stretch_core::Target;
 
-/// What a receptor answers for one sample.
+/// Estimate for one sample, as returned by `Receptor.step`.
 #[pyclass(frozen, module = "stretch_gap", get_all)]
 #[derive(Debug, Clone)]
 pub(crate) struct Reading {
-    /// The estimate, in the reference's unit.
+    /// Estimate, float, in the unit of the reference.
     estimate: f64,
-    /// Its rate, in that unit per second; NaN of a line or a curve while the rate estimator warms up.
+    /// Rate of change of the estimate, float, in the unit of the reference per second.
+    ///
+    /// The rate is NaN while the rate estimator of a line or of a curve still warms up, because these two models give estimates
+    /// without a rate.
     rate: f64,
-    /// Which way it moves: `rising` or `falling`.
+    /// Direction of motion, `"rising"` or `"falling"`.
+    ///
+    /// The direction is that of the calibrated quantity. A length that is calibrated as a contraction becomes shorter while the
+    /// direction is `"rising"`.
     branch: &'static str,
-    /// Whether the sample lay where the calibration was fitted: `inside`, else what was clamped.
+    /// Position of the sample relative to the fitted range.
+    ///
+    /// The value is `"inside"`, `"signal_clamped"`, `"rate_clamped"` or `"both_clamped"`. A signal or a rate outside the fitted
+    /// range is clamped to the end of the range, because a calibration is never extrapolated.
     domain: String,
-    /// Standard deviation of the estimate, where the model knows it.
+    /// Standard deviation of the estimate in the unit of the reference, or None if the model does not estimate it.
     sd: Option<f64>,
 }
 
@@ -28,7 +37,19 @@ impl Reading {
     }
 }
 
-/// A calibration that takes one sample after the other and minds their time stamps.
+/// Calibration that runs live, one sample at a time.
+///
+/// `Calibration.receptor` creates a receptor. The receptor checks the time stamps of the samples and counts their faults.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> import stretch_gap
+/// >>> time_s = np.arange(0, 20, 0.01)
+/// >>> angle_deg = 45 - 45 * np.cos(1.5 * time_s)
+/// >>> gauge_v = 0.002 * angle_deg + 1e-4 * np.random.default_rng(0).normal(size=time_s.size)
+/// >>> calibration = stretch_gap.calibrate(gauge_v, angle_deg, 100.0, model="linear", reference_name="angle_deg")
+/// >>> receptor = calibration.receptor()
 #[pyclass(module = "stretch_gap")]
 #[derive(Debug)]
 pub(crate) struct Receptor {
@@ -37,9 +58,26 @@ pub(crate) struct Receptor {
 
 #[pymethods]
 impl Receptor {
-    /// The reading of the next sample; None while the rate estimator warms up, and where a sample is not a number.
+    /// Process the next sample.
     ///
-    /// Missing ticks count as missing samples: a few are bridged, a longer gap warms up again.
+    /// Parameters
+    /// ----------
+    /// time_s : float
+    ///     Time of the sample in seconds. Time stamps must increase. If samples are missing, a short gap is bridged, and a longer
+    ///     gap restarts the warm-up.
+    /// signal : float
+    ///     Value of the signal, in the unit of the signal that was calibrated.
+    ///
+    /// Returns
+    /// -------
+    /// Reading or None
+    ///     Estimate for the sample. None if there is no estimate, because the rate estimator still warms up or because the
+    ///     sample is not a number.
+    ///
+    /// Examples
+    /// --------
+    /// >>> readings = [receptor.step(time_s, volt) for time_s, volt in zip(time_s[:100], gauge_v)]
+    /// >>> assert abs(readings[-1].estimate - angle_deg[99]) < 1.0
     fn step(&mut self, time_s: f64, signal: f64) -> Option<Reading> {
         let reading = self.live.step(time_s, signal).ok()?;
         Some(Reading {
@@ -51,12 +89,26 @@ impl Receptor {
         })
     }
 
-    /// The pressure of the samples to come, for a calibration that needs it.
+    /// Set the pressure of the following samples.
+    ///
+    /// A calibration needs the pressure only if its gauge depends on the pressure.
+    ///
+    /// Parameters
+    /// ----------
+    /// pressure : float
+    ///     Pressure in kPa.
+    ///
+    /// Examples
+    /// --------
+    /// >>> receptor.set_pressure(101.3)
     fn set_pressure(&mut self, pressure: f64) {
         self.live.set_pressure(pressure);
     }
 
-    /// What was wrong with the time stamps so far: samples missing, jittered, and running backwards.
+    /// Number of faulty time stamps so far, by kind.
+    ///
+    /// `missing` counts samples that did not arrive, `jittered` samples that were early or late by more than a fifth of the
+    /// sample interval, and `backwards` time stamps that were repeated or ran backwards.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let faults = self.live.faults();

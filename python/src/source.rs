@@ -18,7 +18,17 @@ create_exception!(
     stretch,
     Refused,
     StretchError,
-    "Raised by a simulator that cannot simulate these values: the fit turns back and goes on elsewhere."
+    "Error that a simulator raises if it cannot simulate the requested values.
+
+A simulator that runs inside `stretch_gap.diagnose` raises this exception for values that it cannot simulate. The fit then
+continues with other values. Any other exception of the simulator ends the diagnosis.
+
+Examples
+--------
+>>> import stretch_gap
+>>> def simulate(params, effects):
+...     if params[\"mass\"] < 0:
+...         raise stretch_gap.Refused(\"the mass is negative\")"
 );
 
 /// One requested run, and the channel for its result.

@@ -21,6 +21,13 @@ class Refused(StretchError):
 
     A simulator that runs inside `stretch_gap.diagnose` raises this exception for values that it cannot simulate. The fit then
     continues with other values. Any other exception of the simulator ends the diagnosis.
+
+    Examples
+    --------
+    >>> import stretch_gap
+    >>> def simulate(params, effects):
+    ...     if params["mass"] < 0:
+    ...         raise stretch_gap.Refused("the mass is negative")
     """
 
 @final
@@ -60,6 +67,16 @@ class Receptor:
     """Calibration that runs live, one sample at a time.
 
     `Calibration.receptor` creates a receptor. The receptor checks the time stamps of the samples and counts their faults.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretch_gap
+    >>> time_s = np.arange(0, 20, 0.01)
+    >>> angle_deg = 45 - 45 * np.cos(1.5 * time_s)
+    >>> gauge_v = 0.002 * angle_deg + 1e-4 * np.random.default_rng(0).normal(size=time_s.size)
+    >>> calibration = stretch_gap.calibrate(gauge_v, angle_deg, 100.0, model="linear", reference_name="angle_deg")
+    >>> receptor = calibration.receptor()
     """
 
     def step(self, time_s: float, signal: float) -> Reading | None:
@@ -78,6 +95,11 @@ class Receptor:
         Reading or None
             Estimate for the sample. None if there is no estimate, because the rate estimator still warms up or because the
             sample is not a number.
+
+        Examples
+        --------
+        >>> readings = [receptor.step(time_s, volt) for time_s, volt in zip(time_s[:100], gauge_v)]
+        >>> assert abs(readings[-1].estimate - angle_deg[99]) < 1.0
         """
     def set_pressure(self, pressure: float) -> None:
         """Set the pressure of the following samples.
@@ -88,6 +110,10 @@ class Receptor:
         ----------
         pressure : float
             Pressure in kPa.
+
+        Examples
+        --------
+        >>> receptor.set_pressure(101.3)
         """
     @property
     def faults(self) -> dict[str, int]:

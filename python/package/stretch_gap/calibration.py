@@ -69,6 +69,8 @@ class Calibration:
 
     Examples
     --------
+    The examples of the methods use `calibration`, `gauge` and `angle_deg`.
+
     >>> import numpy as np
     >>> import stretch_gap
     >>> time_s = np.arange(0, 20, 0.01)
@@ -103,6 +105,11 @@ class Calibration:
         ------
         StretchError
             If the text is not a calibration that can be used.
+
+        Examples
+        --------
+        >>> stretch_gap.Calibration.from_json(calibration.to_json()).reference
+        'angle_deg'
         """
         return Calibration(_stretch.CalibrationRecord.from_json(text))
 
@@ -124,6 +131,15 @@ class Calibration:
         ------
         StretchError
             If the file cannot be read, or is not a calibration that can be used.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     calibration.save(f"{folder}/gauge.json")
+        ...     again = stretch_gap.Calibration.load(f"{folder}/gauge.json")
+        >>> again == calibration
+        True
         """
         return Calibration(_stretch.CalibrationRecord.load(path))
 
@@ -142,6 +158,15 @@ class Calibration:
         ------
         StretchError
             If the file exists under a name with another ending, or cannot be written.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     calibration.save(f"{folder}/gauge.json")
+        ...     again = stretch_gap.Calibration.load(f"{folder}/gauge.json")
+        >>> again == calibration
+        True
         """
         self._record.save(replaceable(path, ".json", ".postcard"))
 
@@ -153,6 +178,12 @@ class Calibration:
         str
             JSON that `Calibration.from_json` and the program `stretch` read (`stretch apply`, `stretch listen`, `stretch
             export`).
+
+        Examples
+        --------
+        >>> import json
+        >>> json.loads(calibration.to_json())["reference"]
+        'angle_deg'
         """
         return self._record.to_json()
 
@@ -256,6 +287,14 @@ class Calibration:
         DoubtWarning
             If the recording does not match the calibration: another sample rate, another unit, a constant signal, or many samples
             outside the fitted range.
+
+        Examples
+        --------
+        >>> estimate = calibration.apply(gauge)
+        >>> estimate.value.shape, estimate.unit
+        ((2000,), 'deg')
+        >>> bool(np.nanmax(np.abs(estimate.value - angle_deg)) < 1.0)
+        True
         """
         values = column(signal, "signal")
         if rate_hz is None and time_s is None:
@@ -312,6 +351,12 @@ class Calibration:
         -----
         DoubtWarning
             If there are reasons to doubt the errors. `stretch_gap.evaluate` lists them.
+
+        Examples
+        --------
+        >>> evaluation = calibration.evaluate(gauge[::-1], angle_deg[::-1], 100.0)
+        >>> evaluation.rmse < 0.1
+        True
         """
         from .evaluation import evaluate
 
@@ -330,6 +375,13 @@ class Calibration:
         StretchError
             If the calibration cannot run live. A calibration with the rate estimator `central` cannot, because that estimator
             needs the next sample.
+
+        Examples
+        --------
+        >>> receptor = calibration.receptor()
+        >>> readings = [receptor.step(time_s, volt) for time_s, volt in zip(np.arange(100) / 100, gauge)]
+        >>> bool(abs(readings[-1].estimate - angle_deg[99]) < 1.0)
+        True
         """
         return self._record.receptor()
 

@@ -31,6 +31,24 @@ class Diagnosis:
     `diagnose` returns this class. The *gap* is the mean square error of the simulator beyond the noise of the measurement. A
     *named* effect is one that the diagnosis reports as missing. *Re-tuned* means that the nominal parameters were fitted within
     their tolerances. A notebook displays the report of a diagnosis.
+
+    Examples
+    --------
+    A spring is softer than the simulator assumes, and its length is measured 60 ms late. The examples of the methods use
+    `found`.
+
+    >>> import numpy as np
+    >>> import stretch_gap
+    >>> time_s = np.arange(0, 60, 0.01)
+    >>> force = 20 * np.sin(1.3 * time_s) + 10 * np.sin(3.1 * time_s)
+    >>> length = 2.1 * np.interp(time_s - 0.06, time_s, force) + 0.01 * np.random.default_rng(0).normal(size=time_s.size)
+    >>> data = {"time_s": time_s, "force_N": force, "length_mm": length}
+    >>> def spring(params, effects, inputs):
+    ...     return params["compliance"] * inputs["force_N"]
+    >>> question = {"output": "length_mm", "inputs": "force_N", "wrap": ["output.delay", "output.saturation"]}
+    >>> found = stretch_gap.diagnose(spring, data, parameters={"compliance": (2.0, 0.2)}, **question)
+    >>> found.verdict, found.named
+    ('effect', ['output.delay'])
     """
 
     def __init__(
@@ -74,6 +92,11 @@ class Diagnosis:
         ------
         json.JSONDecodeError
             If the text is not JSON.
+
+        Examples
+        --------
+        >>> stretch_gap.Diagnosis.from_json(found.to_json()).named
+        ['output.delay']
         """
         return Diagnosis(json.loads(text))
 
@@ -277,6 +300,14 @@ class Diagnosis:
         ------
         StretchError
             If there is no such output, or if the diagnosis was read from text.
+
+        Examples
+        --------
+        >>> curves = found.curves("length_mm")
+        >>> {name: curve.shape for name, curve in curves.items()}
+        {'measured': (6000,), 'as_shipped': (6000,), 'retuned': (6000,), 'with_effects': (6000,)}
+        >>> bool(np.std(curves["measured"] - curves["with_effects"]) < 0.02)
+        True
         """
         if not self._curves:
             raise StretchError("this diagnosis was read from text, which contains no curves; diagnose again")
@@ -300,6 +331,12 @@ class Diagnosis:
         ------
         StretchError
             If there is no such output, if the diagnosis was read from text, or if matplotlib is not installed.
+
+        Examples
+        --------
+        >>> curves, residuals = found.plot()
+        >>> curves.get_ylabel()
+        'length_mm'
         """
         values = self.curves(output)
         return figures.draw(values, self._session["dt_s"], figures.output_of(self._curves, output), self.sentence)
@@ -314,6 +351,15 @@ class Diagnosis:
             simulator. `Fix.predict` predicts new recordings, and `Fix.diagnose` diagnoses the fixed simulator. If the diagnosis
             was read from text, the code contains equations instead of functions, and the fix cannot be run. If the fixed
             simulator was diagnosed, the effects of the earlier fix come first.
+
+        Examples
+        --------
+        >>> fix = found.fix()
+        >>> round(fix.parameters["compliance"], 2), round(fix.effects["output.delay"]["delay_s"], 3)
+        (2.1, 0.06)
+        >>> fixed = fix(inputs={"force_N": np.ones(200)})  # called in place of `spring`
+        >>> round(float(fixed[-1]), 2)
+        2.1
         """
         implement = self._answer.get("implement", [])
         return fix(self.parameters, self.effects, implement, self._functions, self._again, self._why_not(), self._earlier)
@@ -346,6 +392,10 @@ class Diagnosis:
         ------
         StretchError
             If the specification does not contain a joint or an actuator of the problem.
+
+        Examples
+        --------
+        >>> left = found.apply(problem.spec)  # doctest: +SKIP
         """
         from . import mujoco
 
@@ -367,6 +417,12 @@ class Diagnosis:
         StretchError
             If the diagnosis was read from text, if rerun-sdk is not installed, or if the file exists under a name with another
             ending.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     found.to_rerun(f"{folder}/why.rrd")
         """
         if not self._curves or not self._session:
             raise StretchError("this diagnosis was read from text, which contains no curves; diagnose again")
@@ -380,6 +436,12 @@ class Diagnosis:
         -------
         str
             JSON as written by `stretch diagnose --json` and read by `Diagnosis.from_json` and `stretch calibrate --from`.
+
+        Examples
+        --------
+        >>> import json
+        >>> json.loads(found.to_json())["named"]
+        ['output.delay']
         """
         return json.dumps(self._answer, indent=2)
 
@@ -392,6 +454,11 @@ class Diagnosis:
             The table, with the columns `effects`, `probability`, `closed` (closed share of the gap, with its 95 % interval from
             `closed_low` to `closed_high`), `gap_before` and `gap_after` (gap without and with the effects, in multiples of the
             noise variance), and `parameters` (values of the effects). A dict of columns if pandas is not installed.
+
+        Examples
+        --------
+        >>> list(found.to_frame()["effects"])[0]
+        'output.delay'
         """
         rows = [
             {
@@ -425,6 +492,14 @@ class Diagnosis:
         ------
         StretchError
             If the diagnosis was read from text, or if the file exists under a name with another ending.
+
+        Examples
+        --------
+        >>> import tempfile
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     page = found.report(f"{folder}/spring.html")
+        >>> page[:15]
+        '<!DOCTYPE html>'
         """
         if not self._page:
             raise StretchError("this diagnosis was read from text, which contains no report; diagnose again")

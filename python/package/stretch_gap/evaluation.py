@@ -22,6 +22,20 @@ class Evaluation:
     fitted range), `rmse`, `bias`, `mae`, `max` (in `unit`), `rmse_percent`, `average_error_percent`,
     `average_error_percent_of_reference`, `signed_error_percent`, `r_squared`, and `lag_s` (delay of the estimate in seconds, or
     None).
+
+    Examples
+    --------
+    The examples of the methods use `evaluation`.
+
+    >>> import numpy as np
+    >>> import stretch_gap
+    >>> time_s = np.arange(0, 40, 0.01)
+    >>> angle_deg = 45 - 45 * np.cos(1.5 * time_s + 0.4 * np.sin(0.37 * time_s))
+    >>> gauge_v = 0.5 + 0.002 * angle_deg + 1e-4 * np.random.default_rng(0).normal(size=time_s.size)
+    >>> calibration = stretch_gap.calibrate(gauge_v[:2000], angle_deg[:2000], 100.0, model="linear", reference_name="angle_deg")
+    >>> evaluation = calibration.evaluate(gauge_v[2000:], angle_deg[2000:], 100.0)
+    >>> evaluation.rmse < 0.1 and evaluation.unit == "deg"
+    True
     """
 
     def __init__(self, answer: dict[str, Any]) -> None:
@@ -67,6 +81,12 @@ class Evaluation:
         -------
         str
             JSON as printed by `stretch evaluate --json`.
+
+        Examples
+        --------
+        >>> import json
+        >>> json.loads(evaluation.to_json())["unit"]
+        'deg'
         """
         return json.dumps(self._answer, indent=2)
 
@@ -77,6 +97,11 @@ class Evaluation:
         -------
         pandas.DataFrame or dict of str to list
             The table. A dict of columns if pandas is not installed. The recording `"all"` holds the errors over all recordings.
+
+        Examples
+        --------
+        >>> list(evaluation.to_frame()["method"])[:2]
+        ['raw', 'linear']
         """
         rows = [{"recording": "all", **row} for row in self.pooled.values()]
         rows += [{"recording": name, **row} for name, all_ in self.recordings.items() for row in all_.values()]

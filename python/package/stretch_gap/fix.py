@@ -50,6 +50,27 @@ class Fix:
     code : str
         The same as Python code to paste into the simulator: the parameters, a function for each effect around the simulator,
         and the values of each effect that the simulator itself implements.
+
+    Examples
+    --------
+    A spring is softer than the simulator assumes, and its length is measured 60 ms late. The examples of the methods use
+    `found` and `fix`.
+
+    >>> import numpy as np
+    >>> import stretch_gap
+    >>> time_s = np.arange(0, 60, 0.01)
+    >>> force = 20 * np.sin(1.3 * time_s) + 10 * np.sin(3.1 * time_s)
+    >>> length = 2.1 * np.interp(time_s - 0.06, time_s, force) + 0.01 * np.random.default_rng(0).normal(size=time_s.size)
+    >>> data = {"time_s": time_s, "force_N": force, "length_mm": length}
+    >>> def spring(params, effects, inputs):
+    ...     return params["compliance"] * inputs["force_N"]
+    >>> question = {"output": "length_mm", "inputs": "force_N", "wrap": ["output.delay", "output.saturation"]}
+    >>> found = stretch_gap.diagnose(spring, data, parameters={"compliance": (2.0, 0.2)}, **question)
+    >>> fix = found.fix()
+    >>> round(fix.effects["output.delay"]["delay_s"], 3)
+    0.06
+    >>> "def output_delay(" in fix.code
+    True
     """
 
     parameters: dict[str, float]
@@ -67,9 +88,10 @@ class Fix:
     def __call__(self, params: Any = None, effects: Any = None, *more: Any, **named: Any) -> Any:
         """Run the fixed simulator: the user's simulator with the re-tuned parameters, and the named effects around it.
 
-        A fix is called as the user's simulator is: if that is an object with a method `simulate`, so is the fix. `diagnose` takes
-        a fix as its simulator, but `Fix.diagnose` is faster, and only its fix also lists the effects of this one. The sample time must be that of the diagnosis. An effect around the
-        simulator begins at rest in each recording, at the first value of its column.
+        A fix is called as the user's simulator is: if that is an object with a method `simulate`, so is the fix. `diagnose`
+        takes a fix as its simulator, but `Fix.diagnose` is faster, and only its fix also lists the effects of this one. The
+        sample time must be that of the diagnosis. An effect around the simulator begins at rest in each recording, at the first
+        value of its column.
 
         Parameters
         ----------
@@ -94,20 +116,11 @@ class Fix:
 
         Examples
         --------
-        >>> import numpy as np
-        >>> import stretch_gap
-        >>> time_s = np.arange(0, 60, 0.01)
-        >>> force = 20 * np.sin(1.3 * time_s) + 10 * np.sin(3.1 * time_s)
-        >>> noise = 0.01 * np.random.default_rng(0).normal(size=time_s.size)
-        >>> data = {"time_s": time_s, "force_N": force, "length_mm": 2.1 * np.clip(force, -15, 15) + noise}
-        >>> def spring(params, effects, inputs):
-        ...     return params["compliance"] * inputs["force_N"]
-        >>> question = {"output": "length_mm", "inputs": "force_N", "wrap": "output.saturation"}
-        >>> found = stretch_gap.diagnose(spring, data, parameters={"compliance": (2.0, 0.2)}, **question)
-        >>> fixed = found.fix()
-        >>> np.round(fixed(inputs={"force_N": np.linspace(0, 30, 4)}))
-        array([ 0., 21., 31., 31.])
-        >>> stretch_gap.diagnose(fixed, data, **question).verdict
+        >>> length = fix(inputs={"force_N": np.linspace(0, 30, 301)})
+        >>> softer = fix({"compliance": 3.0}, inputs={"force_N": np.linspace(0, 30, 301)})
+        >>> np.round([length[-1], softer[-1]], 1)
+        array([61.7, 88.2])
+        >>> stretch_gap.diagnose(fix, data, **question).verdict
         'no_gap'
         """
         again, asked = self._called()
@@ -157,6 +170,13 @@ class Fix:
         ------
         StretchError
             If the fix cannot be called.
+
+        Examples
+        --------
+        >>> stages = [{"inputs": ["force_N"], "output": "length_mm"}]
+        >>> trials = [{"name": "tuesday", "samples": 3000, "start_s": 0.0}]
+        >>> columns = {"force_N": force[:3000], "length_mm": length[:3000]}
+        >>> fix.begin({"columns": columns, "stages": stages, "trials": trials})
         """
         again, asked = self._called()
         asked.bind({**session, "parameters": again.session["parameters"], "effects": again.session["effects"]})
@@ -200,6 +220,15 @@ class Fix:
         StretchError
             If the fix cannot be run, because the diagnosis was read from text or has the verdict `"unknown"` or `"record"`, or if
             the recordings are wrong.
+
+        Examples
+        --------
+        >>> new = {"time_s": time_s, "force_N": -force, "length_mm": -length}
+        >>> predicted = fix.predict(new)
+        >>> predicted.ratio < 0.1
+        True
+        >>> round(predicted.times_noise)
+        1
         """
         again = self._runnable()
         fitted, begins_s = again.fixed.fitted
@@ -242,6 +271,14 @@ class Fix:
         StretchError
             If the fix cannot be run, because the diagnosis was read from text or has the verdict `"unknown"` or `"record"`, or if
             the recordings are wrong.
+
+        Examples
+        --------
+        >>> again = fix.diagnose()
+        >>> again.verdict, again.named
+        ('no_gap', [])
+        >>> list(again.fix().effects)  # the effects of both diagnoses
+        ['output.delay']
         """
         from .diagnosis import run
 
@@ -268,6 +305,25 @@ class Prediction:
     ----------
     sentence : str
         Result in plain English.
+
+    Examples
+    --------
+    A spring is softer than the simulator assumes, and its length is measured 60 ms late. The examples of the methods use
+    `predicted`.
+
+    >>> import numpy as np
+    >>> import stretch_gap
+    >>> time_s = np.arange(0, 60, 0.01)
+    >>> force = 20 * np.sin(1.3 * time_s) + 10 * np.sin(3.1 * time_s)
+    >>> length = 2.1 * np.interp(time_s - 0.06, time_s, force) + 0.01 * np.random.default_rng(0).normal(size=time_s.size)
+    >>> data = {"time_s": time_s, "force_N": force, "length_mm": length}
+    >>> def spring(params, effects, inputs):
+    ...     return params["compliance"] * inputs["force_N"]
+    >>> question = {"output": "length_mm", "inputs": "force_N", "wrap": ["output.delay", "output.saturation"]}
+    >>> found = stretch_gap.diagnose(spring, data, parameters={"compliance": (2.0, 0.2)}, **question)
+    >>> predicted = found.fix().predict({"time_s": time_s, "force_N": -force, "length_mm": -length})
+    >>> predicted.ratio < 0.1
+    True
     """
 
     def __init__(self, text: str, sentence: str, curves: Mapping[str, Sequence[Array]], dt_s: float) -> None:
@@ -330,6 +386,11 @@ class Prediction:
         ------
         StretchError
             If there is no such output.
+
+        Examples
+        --------
+        >>> list(predicted.curves("length_mm"))
+        ['measured', 'without', 'with_effects']
         """
         three = self._curves[figures.output_of(self._curves, output)]
         return dict(zip(("measured", "without", "with_effects"), three))
@@ -351,6 +412,12 @@ class Prediction:
         ------
         StretchError
             If there is no such output, or if matplotlib is not installed.
+
+        Examples
+        --------
+        >>> curves, residuals = predicted.plot()
+        >>> curves.get_ylabel()
+        'length_mm'
         """
         return figures.draw(self.curves(output), self._dt_s, figures.output_of(self._curves, output), self.sentence)
 
@@ -361,6 +428,12 @@ class Prediction:
         -------
         str
             JSON as written by `stretch predict --json`.
+
+        Examples
+        --------
+        >>> import json
+        >>> json.loads(predicted.to_json())["effects"]
+        ['output.delay']
         """
         return json.dumps(self._answer, indent=2)
 

@@ -66,6 +66,10 @@ def apply(diagnosis: Diagnosis, spec: Any) -> list[str]:
     ------
     StretchError
         If the specification does not contain a joint or an actuator of the problem.
+
+    Examples
+    --------
+    >>> left = stretch_gap.mujoco.apply(found, problem.spec)  # doctest: +SKIP
     """
     known = {joint.name: joint for joint in spec.joints} | {actuator.name: actuator for actuator in spec.actuators}
     own = {name: next(iter(values.values())) for name, values in diagnosis.effects.items() if parts(name)[0] in known and values}

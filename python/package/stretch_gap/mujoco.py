@@ -1,10 +1,36 @@
 """Diagnosis of a MuJoCo model with a recording. Requires the package `mujoco`.
 
-The function `problem` defines the problem from the model and the recording::
+The function `problem` defines the problem from the model and the recording, `Problem.diagnose` diagnoses it, and
+`Diagnosis.apply` writes the result into the specification of the model. Here a joint has a friction that the model lacks. The
+examples of the functions use these names.
 
-    problem = stretch_gap.mujoco.problem("arm.xml", "run.csv")
-    found = problem.diagnose()
-    left = found.apply(problem.spec)
+>>> import mujoco
+>>> import numpy as np
+>>> import stretch_gap.mujoco
+>>> model = '''<mujoco>
+...   <worldbody><body>
+...     <joint name="elbow" axis="0 1 0" armature="0.02"/>
+...     <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02" mass="0.5"/>
+...   </body></worldbody>
+...   <actuator><position name="motor" joint="elbow" kp="20" kv="1"/></actuator>
+... </mujoco>'''
+>>> time_s = np.arange(0, 20, 0.02)
+>>> command = 0.5 * np.sin(1.5 * time_s) + 0.2 * np.sin(5 * time_s)
+>>> position = 0.001 * np.random.default_rng(0).normal(size=time_s.size)
+>>> machine = mujoco.MjModel.from_xml_string(model.replace("armature", 'frictionloss="0.8" armature'))
+>>> state = mujoco.MjData(machine)
+>>> for i, state.ctrl[0] in enumerate(command):
+...     position[i] += state.qpos[0]
+...     mujoco.mj_step(machine, state, 10)
+>>> recording = {"time_s": time_s, "elbow_cmd_rad": command, "elbow_rad": position}  # or the path of a file
+>>> problem = stretch_gap.mujoco.problem(model, recording)
+>>> found = problem.diagnose(wrap=None)
+>>> found.named
+['elbow_frictionloss']
+>>> found.apply(problem.spec)
+[]
+>>> round(float(problem.spec.joint("elbow").frictionloss), 1)
+0.8
 
 Columns are assigned to joints by name. Gains, damping and armature that the model has become parameters with tolerances.
 Friction loss, damping and armature that the model lacks become candidate effects. Effects around the simulator, such as delay
@@ -82,6 +108,12 @@ class Simulator:
         session : dict
             Everything that stays the same during a diagnosis. `dt_s` (the sample interval, s) and `columns` (arrays by name)
             are used.
+
+        Examples
+        --------
+        >>> problem.simulator.begin({"dt_s": 0.02, "columns": recording})
+        >>> problem.simulator.steps
+        10
         """
         self.dt_s, self.columns = float(session["dt_s"]), session["columns"]
         self.steps = max(1, round(self.dt_s / float(self.model.opt.timestep)))
@@ -99,6 +131,12 @@ class Simulator:
         -------
         mujoco.MjModel
             The changed copy.
+
+        Examples
+        --------
+        >>> varied = problem.simulator.varied({"elbow_damping": 0.5})
+        >>> float(varied.dof_damping[0])
+        0.5
         """
         model = copy.copy(self.model)
         for name, value in values.items():
@@ -126,6 +164,11 @@ class Simulator:
         -------
         dict of str to ndarray of shape (n, samples)
             Positions by column, in the unit of the column. NaN for a model that diverges.
+
+        Examples
+        --------
+        >>> def simulate(params, effects, inputs, trials):  # a simulator of your own around this one, for stretch_gap.diagnose
+        ...     return problem.simulator.simulate(params, effects, inputs, trials)
         """
         mujoco = library()
         count = params.shape[0]
@@ -216,6 +259,13 @@ class Problem:
         ------
         StretchError
             If an argument or a recording is wrong.
+
+        Examples
+        --------
+        >>> problem = stretch_gap.mujoco.problem(model, recording)
+        >>> found = problem.diagnose(wrap=None, depth=1)
+        >>> found.named
+        ['elbow_frictionloss']
         """
         from .diagnosis import diagnose
 
@@ -265,6 +315,12 @@ def problem(
         cannot be diagnosed: a joint in `joints` that never moved, a command that is constant or equal to the measurement,
         columns that can only be in degrees although neither their names nor `degrees` say so, a joint without a position
         actuator, or a ball or free joint.
+
+    Examples
+    --------
+    >>> problem = stretch_gap.mujoco.problem(model, recording)
+    >>> list(problem.parameters), list(problem.effects)
+    (['motor_kp', 'motor_kv', 'elbow_armature'], ['elbow_damping', 'elbow_frictionloss'])
     """
     mujoco = library()
     spec = specification(mujoco, model)

@@ -74,6 +74,12 @@ class Argument:
         Unit of the argument. Empty if it has none.
     log : bool, default False
         Whether the argument is searched on a logarithmic scale. `min` must then be positive.
+
+    Examples
+    --------
+    >>> import stretch_gap
+    >>> stretch_gap.Argument(0.001, 1.0, off=None, unit="s", log=True).max
+    1.0
     """
 
     min: float
@@ -97,6 +103,14 @@ class Effect:
         Names of the stages in which the effect acts. `()` means all stages.
     twins : sequence of str, default ()
         Names of effects that are hard to distinguish from this effect. They are fitted together with it.
+
+    Examples
+    --------
+    >>> import stretch_gap
+    >>> stick = stretch_gap.Argument(0.0, 5.0, unit="N")
+    >>> creep = stretch_gap.Argument(0.01, 1.0, off=None, unit="m/s", log=True)
+    >>> list(stretch_gap.Effect({"stick": stick, "creep": creep}).arguments)
+    ['stick', 'creep']
     """
 
     arguments: Mapping[str, Argument]
@@ -125,6 +139,12 @@ class Stage:
         output is used if a force or a torque drives the stage and the output is a speed, a position or an angle.
     position : str, optional
         Column of the position from which this velocity is computed.
+
+    Examples
+    --------
+    >>> import stretch_gap
+    >>> stretch_gap.Stage("angle_deg", "cmd_deg", name="servo").inputs
+    ('cmd_deg',)
     """
 
     output: str
@@ -162,6 +182,13 @@ class Trial:
     start_s : float, optional
         Start of the recording in the session, s. It matters for effects that drift. By default a pause of 15 s after the previous
         recording is assumed.
+
+    Examples
+    --------
+    >>> import stretch_gap
+    >>> trial = stretch_gap.Trial({"force_N": [0, 1, 2], "length_mm": [0, 2, 4]}, rate_hz=100.0, name="tuesday", test=True)
+    >>> trial.name, trial.test
+    ('tuesday', True)
     """
 
     columns: Mapping[str, ArrayLike]

@@ -54,6 +54,19 @@ class Recording(Mapping[str, Array]):
         Data before the resampling, by clock: the time stamps `time_s` of the clock, and its columns.
     notes : list of str
         Sentences on what was guessed, renamed, resampled or left out.
+
+    Examples
+    --------
+    >>> import pathlib
+    >>> import tempfile
+    >>> import stretch_gap
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> path = pathlib.Path(folder.name, "run.csv")
+    >>> _ = path.write_text(chr(10).join(["time_s,length_mm", *(f"{i / 100},{165 + i / 8}" for i in range(60))]))
+    >>> recording = stretch_gap.read(path)
+    >>> list(recording), recording.name
+    (['time_s', 'length_mm'], 'run.csv')
+    >>> folder.cleanup()
     """
 
     def __init__(self, name: str, columns: dict[str, Array], clocks: dict[str, dict[str, Array]], notes: Sequence[str]) -> None:
@@ -88,6 +101,11 @@ class Recording(Mapping[str, Array]):
         -------
         pandas.DataFrame or dict of str to list
             The table. A dict of columns if pandas is not installed.
+
+        Examples
+        --------
+        >>> [float(x) for x in recording.to_frame()["length_mm"][:2]]
+        [165.0, 165.125]
         """
         return frame([dict(zip(self._columns, row)) for row in zip(*self._columns.values())])
 

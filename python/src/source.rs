@@ -26,9 +26,8 @@ continues with other values. Any other exception of the simulator ends the diagn
 Examples
 --------
 >>> import stretch_gap
->>> def simulate(params, effects):
-...     if params[\"mass\"] < 0:
-...         raise stretch_gap.Refused(\"the mass is negative\")"
+>>> error = stretch_gap.Refused(\"the solver did not converge\")  # a simulator raises this error
+>>> assert isinstance(error, stretch_gap.StretchError)"
 );
 
 /// One requested run, and the channel for its result.

@@ -25,9 +25,8 @@ class Refused(StretchError):
     Examples
     --------
     >>> import stretch_gap
-    >>> def simulate(params, effects):
-    ...     if params["mass"] < 0:
-    ...         raise stretch_gap.Refused("the mass is negative")
+    >>> error = stretch_gap.Refused("the solver did not converge")  # a simulator raises this error
+    >>> assert isinstance(error, stretch_gap.StretchError)
     """
 
 @final

@@ -544,8 +544,8 @@ def diagnose(
     noise: Mapping[str, float] | None = None,
     velocity: str | None = None,
     position: str | None = None,
-    beside: Sequence[str] = (),
-    without: Sequence[str] = (),
+    beside: str | Sequence[str] = (),
+    without: str | Sequence[str] = (),
     reference: str | None = None,
     experiment: bool = False,
     budget: int | None = None,
@@ -616,9 +616,9 @@ def diagnose(
         Column of the velocity at which parts with friction move. Ignored if `stages` is given.
     position : str, optional
         Column of the position from which this velocity is computed. Ignored if `stages` is given.
-    beside : sequence of str, default ()
+    beside : str or sequence of str, default ()
         Further columns that effects may depend on: channels with possible cross-talk, or loads of a contact.
-    without : sequence of str, default ()
+    without : str or sequence of str, default ()
         Effects that are not examined, by name (`"output.backlash"`), kind (`"backlash"`) or place (`"output.all"`).
     reference : str, optional
         Column of the quantity that the output measures, if the output is the signal of a sensor. With `stages` this output is
@@ -706,20 +706,13 @@ def diagnose(
         if (output is None) == (stages is None):
             raise StretchError(f"give either output, the name of the measured column, or stages{_example(data, trials)}")
         listed = list(stages or [entries.Stage(str(output), inputs, velocity=velocity, position=position)])
-        columns = {column for trial in trials for column in trial.columns}
-        units = entries.by_name("units", units, '{"force": "N"}')
-        noise = entries.by_name("noise", noise, '{"length_mm": 0.1}')
-        noise = {column: entries.number(f"noise of {column}", value) for column, value in noise.items()}
+        units = _by_column("units", units, '{"force": "N"}', trials, entries.text)
+        noise = _by_column("noise", noise, '{"length_mm": 0.1}', trials, entries.deviation)
         wrappers = _wrappers(entries.texts("wrap", wrap), listed, asked, notes)
         own = [entries.effect(key, value) for key, value in entries.by_name("effects", effects, EFFECTS).items()]
         off = [a["range"][0] if a["off"] is None else a["off"] for effect in own for a in effect["argument"]]
         beside = entries.texts("beside", beside)
         wanted = entries.wanted(listed, [*beside, *([reference] if reference else [])])
-        recorded = entries.recorded(trials, rate_hz, wanted)
-        for what, given in (("units", units), ("noise", noise)):
-            for column in given:
-                if column not in {*columns, *entries.CLOCKS}:
-                    raise unknown("column", column, sorted(columns), f"{what}: ")
         problem = {
             "stage": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
             "input": _inputs(listed, units, noise if asked.takes_inputs else {}),
@@ -733,7 +726,7 @@ def diagnose(
             "reference": reference,
             "signal": (output or listed[-1].output) if reference else None,
         }
-        checked = _stretch.Problem(json.dumps(problem), recorded)
+        checked = _stretch.Problem(json.dumps(problem), entries.recorded(trials, rate_hz, wanted))
     how = {
         "name": name,
         "depth": entries.whole("depth", depth, 1),
@@ -762,6 +755,18 @@ def _example(data: Any, trials: Sequence[entries.Trial]) -> str:
     driven = f', inputs=["{columns[0]}"]' if len(columns) > 1 else ""
     call = f'stretch_gap.diagnose(simulator, {shown}, output="{columns[-1]}"{driven}, parameters={PARAMETERS})'
     return f"; the columns are {', '.join(columns)}, so an example is {call}"
+
+
+def _by_column(
+    what: str, given: Any, example: str, trials: Sequence[entries.Trial], value_of: Callable[[str, Any], Any]
+) -> dict[str, Any]:
+    """Return values by column that the user gave. Columns that no recording has are refused."""
+    columns = {str(column) for trial in trials for column in trial.columns}
+    values = entries.by_name(what, given, example)
+    for column in values:
+        if column not in {*columns, *entries.CLOCKS}:
+            raise unknown("column", column, sorted(columns), f"{what}: ")
+    return {column: value_of(f"{what} of {column}", value) for column, value in values.items()}
 
 
 def _inputs(stages: Sequence[entries.Stage], units: Mapping[str, str], noise: Mapping[str, float]) -> list[dict[str, Any]]:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from ._stretch import StretchError
 from .reading import Recording, read
-from .recordings import column, doubt, same_length, times, unknown, without_missing
+from .recordings import column, doubt, number, same_length, times, unknown, without_missing
 
 
 @dataclass(frozen=True)
@@ -288,14 +288,12 @@ def clock(
     return (rate, None) if stamps is None else (None, stamps)
 
 
-def number(what: str, given: Any) -> float:
-    """Return a finite number that the user gave. Text is refused."""
-    try:
-        if not isinstance(given, (str, bytes)) and np.isfinite(float(given)):
-            return float(given)
-    except (TypeError, ValueError):
-        pass
-    raise StretchError(f"{what} is {given!r}; give a finite number")
+def deviation(what: str, given: Any) -> float:
+    """Return a standard deviation that the user gave."""
+    value = number(what, given)
+    if value < 0.0:
+        raise StretchError(f"{what} is {value:g}; give one standard deviation, which is not below 0")
+    return value
 
 
 def whole(what: str, given: Any, least: int) -> int:
@@ -317,6 +315,13 @@ def by_name(what: str, given: Any, example: str) -> dict[str, Any]:
     return dict(given)
 
 
+def text(what: str, given: Any) -> str:
+    """Return text that the user gave."""
+    if not isinstance(given, str):
+        raise StretchError(f"{what} is {given!r}; give text")
+    return given
+
+
 def texts(what: str, given: Any) -> list[str]:
     """Return names that the user gave: one, several, or None."""
     names = [given] if isinstance(given, str) else [] if given is None else given
@@ -328,8 +333,8 @@ def texts(what: str, given: Any) -> list[str]:
 def parameter(name: str, given: ParameterLike) -> dict[str, Any]:
     """Return a parameter in the form of the native module. A tuple is `(value, tolerance)`, and a number is exact."""
     what = f"parameter {name}"
-    is_tuple = isinstance(given, tuple)
-    if isinstance(given, tuple):
+    is_tuple = isinstance(given, (tuple, list))
+    if isinstance(given, (tuple, list)):
         if len(given) != 2:
             raise StretchError(
                 f"{what} is {given!r}; give (value, tolerance), where the tolerance is one standard deviation, or a "
@@ -339,17 +344,11 @@ def parameter(name: str, given: ParameterLike) -> dict[str, Any]:
     elif not isinstance(given, Parameter):
         given = Parameter(given)
     value = number(f"{what}: the value", given.value)
-    least, greatest, tolerance, share = (
+    least, greatest, share = (
         None if one is None else number(f"{what}: {key}", one)
-        for key, one in [
-            ("least", given.least),
-            ("greatest", given.greatest),
-            ("the tolerance", given.tolerance),
-            ("relative", given.relative),
-        ]
+        for key, one in [("least", given.least), ("greatest", given.greatest), ("relative", given.relative)]
     )
-    if tolerance is not None and tolerance < 0.0:
-        raise StretchError(f"{what}: the tolerance is {tolerance:g}; give one standard deviation, which is not below 0")
+    tolerance = None if given.tolerance is None else deviation(f"{what}: the tolerance", given.tolerance)
     if tolerance is None and share is not None and not 0.0 <= share <= 1.0:
         raise StretchError(
             f"{what}: relative is {share:g}, that is, {100.0 * share:g} % of the value; give a share from 0 to 1 (0.1 is 10 %), "
@@ -376,7 +375,7 @@ def effect(name: str, given: EffectLike) -> dict[str, Any]:
     A tuple is the range of one argument, with its value `off` if it is not 0.
     """
     what = f"effect {name}"
-    if isinstance(given, tuple) and len(given) in (2, 3):
+    if isinstance(given, (tuple, list)) and len(given) in (2, 3):
         given = Argument(*given)
     if isinstance(given, Argument):
         given = Effect({name: given})
@@ -411,7 +410,7 @@ def stage(given: Stage, index: int, units: Mapping[str, str], noise: Mapping[str
         "output": given.output,
         "unit": given.unit or units.get(given.output, ""),
         "inputs": list(given.inputs),
-        "noise": noise.get(given.output) if given.noise is None else number(f"noise of {given.output}", given.noise),
+        "noise": noise.get(given.output) if given.noise is None else deviation(f"noise of {given.output}", given.noise),
         "velocity": given.velocity,
         "position": given.position,
     }

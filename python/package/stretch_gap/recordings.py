@@ -63,6 +63,16 @@ def unknown(what: str, name: Any, names: Iterable[str], where: str = "") -> Stre
     return StretchError(f"{where}there is no {what} {name}{hint}; {there}")
 
 
+def number(what: str, given: Any) -> float:
+    """Return a finite number that the user gave. Text is refused."""
+    try:
+        if not isinstance(given, (str, bytes)) and np.isfinite(float(given)):
+            return float(given)
+    except (TypeError, ValueError):
+        pass
+    raise StretchError(f"{what} is {given!r}; give a finite number")
+
+
 def column(values: ArrayLike, what: str) -> Array:
     """Return a column as a one-dimensional array of floats. NaN and infinite values mark missing samples."""
     try:
@@ -104,7 +114,7 @@ def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: s
     if (rate_hz is None) == (time_s is None):
         raise StretchError(f"{what}: give either rate_hz, the sample rate, or time_s, the time stamps")
     if rate_hz is not None:
-        if not 0.0 < rate_hz < float("inf"):
+        if number("rate_hz", rate_hz) <= 0.0:
             raise StretchError(f"rate_hz is {rate_hz}; give a finite number above 0")
         stamps: Array = np.arange(samples, dtype=np.float64) / float(rate_hz)
         return stamps

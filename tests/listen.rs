@@ -239,6 +239,7 @@ fn a_start_that_fails_leaves_nothing_behind() {
     scratch.write("broken.json", "{}");
     let fixed = fixed_record(&example_calibration(), &due()).unwrap();
     scratch.write("cal.postcard", fixed.bytes);
+    scratch.write("cal.json", calibration_to_json(&example_calibration()).unwrap());
     let before = scratch.names();
     for (arguments, parts) in [
         (["--port", "-", "--calibration", "broken.json"].as_slice(), ["broken.json", "schema"]),
@@ -246,6 +247,10 @@ fn a_start_that_fails_leaves_nothing_behind() {
         (
             &["--port", "-", "--calibration", "cal.postcard", "--adc", "16,0,3.3"],
             ["12 bits", "--adc 12,"],
+        ),
+        (
+            &["--port", "-", "--calibration", "cal.json", "--adc", "10,100,1023"],
+            ["cal.json: the signal", "measures from 100 to 1023"],
         ),
     ] {
         let mut command = crate::support::stretch();

@@ -157,7 +157,10 @@ fn quiet_says_results_and_errors_and_verbose_says_how() {
     // The sentence comes first, and at most fifteen lines follow. With -q, only the paths follow.
     let sentence = "On the very data of the fit, poly13 is off by";
     assert!(usual.starts_with(sentence) && usual.lines().count() <= 17, "{usual}");
-    assert!(one_line(&usual).contains("movements were found, and at least 8 are needed"), "{usual}");
+    assert!(
+        one_line(&usual).contains("movements were found, and at least 8 are needed"),
+        "{usual}"
+    );
     assert!(quiet.starts_with(sentence) && quiet.contains("\nwrote "), "{quiet}");
     assert!(!quiet.contains('|') && !quiet.contains("note:"), "{quiet}");
     let judged = |flags: &[&str]| {

@@ -206,7 +206,9 @@ mod tests {
     #[test]
     fn a_unit_is_guessed_only_if_it_makes_the_samples_as_wide_as_the_range() {
         let mut spec = stretch_receptor::example_calibration().into_spec();
-        spec.signal_range = RangeSpec { min: -0.1, max: 1.0, zero: 0.0 }.try_into().unwrap();
+        let mode = stretch_core::Normalisation::MinMax;
+        let wide = stretch_core::RangeSpec { mode, zero: 0.0, min: -0.1, max: 1.0 };
+        spec.signal_range = stretch_core::Range::new(wide).unwrap();
         let range = spec.signal_range;
         let inside = [0; COUNT];
         let told = |factor: f64| {

@@ -41,7 +41,7 @@ use crate::{
 ///
 /// With --out, Ctrl-C ends the stream, and the estimates so far are written.
 ///
-/// If movements no longer reverse at the levels of the calibration, a message on
+/// If movements after a pause reverse at other levels than before it, a message on
 /// standard error states since when, and how far the zero has shifted.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
@@ -292,15 +292,20 @@ impl ZeroWatch {
     /// Handles the state of the zero at the end of a movement, at `time_s`.
     fn take(&mut self, time_s: f64, zero: &Zero<f64>) {
         if let Some(turns) = self.turns.filter(|_| zero.has_shifted && !self.shifted) {
-            let usual = |limit: f64| number((limit * turns.reference_per_signal).abs());
+            let basis = match turns.sessions {
+                0 => "in this calibration".to_owned(),
+                n => format!(
+                    "(in {n} earlier sessions; without a shift, one session in {} at most exceeds it)",
+                    u64::from(n) + 1
+                ),
+            };
             warn(format!(
-                "stretch: {}the zero has shifted by {} {unit} since {:.2} s; the calibration expects at most {} {unit} over five movements and {} {unit} \
-                 over about twenty. If the sensor was put on again, calibrate again",
+                "stretch: {}the zero has shifted by {} {unit} since {:.2} s, across a pause: at most {} {unit} is usual {basis}. If the sensor was put \
+                 on again, calibrate again",
                 self.trial,
                 number(zero.off_reference.abs()),
                 time_s - f64::from(zero.since_samples) * self.period_s,
-                usual(turns.limit),
-                usual(turns.mean_limit),
+                number((turns.limit * turns.reference_per_signal).abs()),
                 unit = self.unit,
             ));
         }

@@ -194,7 +194,7 @@ fn float(
         }
     };
     if let Some(turns) = turns {
-        part = part.with_zero(calibration.spec().polarity, turns);
+        part = part.with_zero(calibration, turns);
     }
     let test = self_test::float(calibration)?;
     let seal = calibration_seal(calibration).map_err(ExportError::NoRecord)?;

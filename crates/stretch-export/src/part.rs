@@ -1,6 +1,6 @@
 //! The contribution of a model to a header.
 
-use stretch_core::Polarity;
+use stretch_core::Calibration;
 use stretch_sleeve::{Turns, ZeroWatch};
 
 use crate::constants::Constants;
@@ -21,8 +21,9 @@ pub(crate) struct Part {
 
 impl Part {
     /// Appends code in `float` that monitors the gauge's zero to the step.
-    pub(crate) fn with_zero(mut self, polarity: Polarity, turns: &Turns) -> Self {
-        let watch = ZeroWatch::<f32>::new(polarity, turns);
+    pub(crate) fn with_zero(mut self, calibration: &Calibration, turns: &Turns) -> Self {
+        let spec = calibration.spec();
+        let watch = ZeroWatch::<f32>::new(spec.polarity, spec.sample_rate_hz, turns);
         let ZeroWatch { finder, sign, shares: [low, high], level, limit, most, .. } = watch;
         self.constants
             .define("ZERO_LEVELS", Turns::MEDIAN_OF as i32, "number of levels in a median")
@@ -31,9 +32,8 @@ impl Part {
             .define("ZERO_LOW_SHARE", low, "share of the low end in a level")
             .define("ZERO_HIGH_SHARE", high, "share of the high end")
             .define("ZERO_LEVEL", level, "level in the calibration, times the sign")
-            .define("ZERO_LIMIT", limit, "limit for the deviation of the median")
-            .define("ZERO_MEAN_LIMIT", watch.mean_limit, "limit for the deviation of the mean")
-            .define("ZERO_MEAN_SHARE", watch.mean_share, "weight of the newest level in the mean")
+            .define("ZERO_LIMIT", limit, "limit for the change of the median across a pause")
+            .define("ZERO_PAUSE", watch.pause_samples, "most samples of a movement without a pause")
             .define("ZERO_MOST", most, "largest deviation of a level that counts")
             .define("ZERO_FOLLOW", watch.following(turns).follow, "share by which the zero follows")
             .define("ZERO_REFERENCE", watch.reference, "estimate per signal, times the sign");

@@ -15,8 +15,8 @@ use stretch_core::{
 /// use stretch_core::record;
 /// use stretch_sleeve::{GaugeCalibration, Turns};
 /// # let turns = Turns {
-/// #     level: 1.24, high_share: 0.0, least_span: 0.3, scatter: 0.01, movements: 40, limit: 0.03, mean_limit: 0.012,
-/// #     false_alarms_an_hour: 0.25, movements_an_hour: 1200.0, follow: 0.025, reference_per_signal: -30.0,
+/// #     level: 1.24, high_share: 0.0, least_span: 0.3, scatter: 0.01, movements: 40, limit: 0.03, pause_s: 12.0,
+/// #     sessions: 0, follow: 0.025, reference_per_signal: -30.0,
 /// # };
 /// let gauge = GaugeCalibration::new(stretch_receptor::example_calibration(), Some(turns))?;
 /// let mut buffer = [0; 4096];
@@ -56,24 +56,26 @@ impl TryFrom<(Calibration, Option<Turns>)> for GaugeCalibration {
     }
 }
 
-/// The levels at which the signal turned during the calibration, and the limits for later ones.
+/// The levels at which the signal turned during the calibration, and the limit for a shift of later ones.
 ///
 /// A movement goes down and up again by at least `least_span`. Its level is the weighted mean of its two turning
 /// points, `y = (1 - high_share) low + high_share high`. The weight is chosen such that the levels in the calibration
-/// scatter least. The calibration has `n` movements with mean `level` and standard deviation `scatter`. The median of
-/// five further movements deviates from `level` by more than `limit = t scatter sqrt(v + 1/n)` with probability `p =
-/// false_alarms_an_hour/(2 movements_an_hour)`. Here `t` is the two-sided quantile of Student's t for `n - 1` degrees
-/// of freedom (Hahn and Meeker, Statistical Intervals, 1991, section 4.6). `v` is the variance of a median of five
-/// divided by that of a single level: 0.2868 for normal and independent levels (David and Nagaraja, Order Statistics,
-/// 2003, section 3.2). `n` and `v` are corrected for the correlation of neighbouring levels. If levels are not normal,
-/// the limit is at least the deviation that a share `q` of the calibration's levels exceeds on either side, where `10
-/// q^3 = p/2`, because three of five levels exceed it that often.
+/// scatter least. The calibration has `n` movements with mean `level` and standard deviation `scatter`.
 ///
-/// A smaller but lasting deviation is found by a running mean of the deviations from `level`. Each deviation is clipped
-/// at [`MOST_INNOVATION`](Self::MOST_INNOVATION) standard deviations, and the newest has a weight `k` of
-/// [`MEAN_SHARE`](Self::MEAN_SHARE) (Roberts, Technometrics 1 (1959) 239). The variance of the mean is that of a level
-/// times `k/(2 - k)`. `mean_limit` is derived from this factor as `limit` is from `v`. Each of the two criteria has
-/// half of the false alarms.
+/// Across a pause of more than `pause_s`, the median of five levels usually changes by at most `limit`:
+///
+/// - Without a prior, `limit = t scatter sqrt(2 v)`. `v` is the variance of a median of five divided by that of a single
+///   level: 0.2868 for normal and independent levels (David and Nagaraja, Order Statistics, 2003, section 3.2). It is
+///   doubled because the medians before and after the pause both scatter. `t` is the two-sided quantile of Student's t
+///   with `n - 1` degrees of freedom for a share of 0.01. `n` and `v` are corrected for the correlation of neighbouring
+///   levels. The limit assumes that levels scatter as in the calibration. It does not include a drift.
+/// - With a prior, `limit = scatter max(m_1, ..., m_k)`. Here `m_i` comes from the `i`-th of `k` earlier sessions, in
+///   which the sensor was not put on again: its first half is used as a calibration, and `m_i` is the largest difference
+///   in its second half between two medians of five consecutive levels, or between one of them and the calibration's
+///   level, divided by the calibration's scatter. If a new session is exchangeable with the `k` earlier ones, its own
+///   value exceeds the limit with a probability of at most `1/(k + 1)` (Dunn, Wasserman and Ramdas, J. Am. Stat. Assoc.
+///   2022, arXiv 1809.07441). Nothing is assumed about the drift within a session. The statement holds for a watch as
+///   long as those halves.
 ///
 /// ```
 /// use stretch_sleeve::Turns;
@@ -84,9 +86,8 @@ impl TryFrom<(Calibration, Option<Turns>)> for GaugeCalibration {
 ///     scatter: 0.01,
 ///     movements: 40,
 ///     limit: 0.03,
-///     mean_limit: 0.012,
-///     false_alarms_an_hour: 0.25,
-///     movements_an_hour: 1200.0,
+///     pause_s: 12.0,
+///     sessions: 0,
 ///     follow: 0.025,
 ///     reference_per_signal: -30.0,
 /// };
@@ -107,14 +108,13 @@ pub struct Turns {
     pub scatter: f64,
     /// Number of movements in the calibration.
     pub movements: u32,
-    /// Largest deviation of the median of five levels, in the signal's unit.
+    /// Largest usual change of the median of five levels across a pause, in the signal's unit.
     pub limit: f64,
-    /// Largest deviation of the running mean of levels, in the signal's unit.
-    pub mean_limit: f64,
-    /// Rate of false alarms of both limits together, for movements like those in the calibration.
-    pub false_alarms_an_hour: f64,
-    /// Movements per hour in the calibration.
-    pub movements_an_hour: f64,
+    /// Longest time without the end of a movement that is not a pause, s: four times the median time in the calibration,
+    /// at least 4 s.
+    pub pause_s: f64,
+    /// Number of earlier sessions from which the limit was computed; 0 without a prior.
+    pub sessions: u32,
     /// Share of a level's innovation (its deviation from the expected level) by which a followed zero moves, 0 to 1.
     pub follow: f64,
     /// Change of the estimate per change of the signal at the level.
@@ -124,9 +124,7 @@ pub struct Turns {
 impl Turns {
     /// Number of levels whose median is compared with the limit.
     pub const MEDIAN_OF: usize = 5;
-    /// Weight of the newest level in the running mean: twenty movements are a minute or two.
-    pub const MEAN_SHARE: f64 = 0.05;
-    /// Largest deviation with which a level counts in a mean or in a followed zero, in standard deviations of levels. A
+    /// Largest deviation with which a level counts in the mean or in a followed zero, in standard deviations of levels. A
     /// movement that ends elsewhere is not drift (Huber, Ann. Math. Stat. 35 (1964) 73, doi 10.1214/aoms/1177703732).
     pub const MOST_INNOVATION: f64 = 2.0;
 
@@ -140,9 +138,7 @@ impl Turns {
             ("turns.least_span", self.least_span),
             ("turns.scatter", self.scatter),
             ("turns.limit", self.limit),
-            ("turns.mean_limit", self.mean_limit),
-            ("turns.false_alarms_an_hour", self.false_alarms_an_hour),
-            ("turns.movements_an_hour", self.movements_an_hour),
+            ("turns.pause_s", self.pause_s),
         ] {
             extent(field, x)?;
         }

@@ -14,10 +14,11 @@ use stretch_sleeve::{
 
 /// Draws the turning points of movements.
 fn turns() -> impl Strategy<Value = Turns> {
-    let sizes = [1e-6..1e3f64, 1e-6..1e3, 1e-6..1e3, 1e-6..1e3, 1e-3..1e3];
-    (sizes, 0.0..1.0, -100.0..100.0, any::<u32>(), 0.0..0.2, -1e3..1e3).prop_map(
-        |(sizes, high_share, level, movements, follow, reference_per_signal)| {
-            let [least_span, scatter, limit, mean_limit, movements_an_hour] = sizes;
+    let sizes = [1e-6..1e3f64, 1e-6..1e3, 1e-6..1e3, 4.0..1e3];
+    let counts = any::<[u32; 2]>();
+    (sizes, 0.0..1.0, -100.0..100.0, counts, 0.0..0.2, -1e3..1e3).prop_map(
+        |(sizes, high_share, level, [movements, sessions], follow, reference_per_signal)| {
+            let [least_span, scatter, limit, pause_s] = sizes;
             Turns {
                 level,
                 high_share,
@@ -25,9 +26,8 @@ fn turns() -> impl Strategy<Value = Turns> {
                 scatter,
                 movements,
                 limit,
-                mean_limit,
-                false_alarms_an_hour: 0.25,
-                movements_an_hour,
+                pause_s,
+                sessions,
                 follow,
                 reference_per_signal,
             }
@@ -92,6 +92,8 @@ fn turns_stand_beside_a_calibration_in_text_and_are_checked() {
     assert!(impossible.contains("turns.limit"), "{impossible}");
     let unknown = spoilt(&|value| value["turns"]["limits"] = json!(0.1));
     assert!(unknown.contains("limits"), "{unknown}");
+    let earlier = spoilt(&|value| value["turns"]["mean_limit"] = json!(0.1));
+    assert!(earlier.contains("an earlier release; calibrate again"), "{earlier}");
     let elsewhere = spoilt(&|value| value["turn"] = json!(0.1));
     assert!(elsewhere.contains("turn"), "{elsewhere}");
 }
@@ -132,6 +134,25 @@ fn files_hold_what_their_names_say() {
         if !name.contains("sleeve") {
             assert_eq!(&read_calibration(&path).unwrap(), gauge.calibration());
         }
+    }
+}
+
+/// Turning points of the earlier form had two limits and a rate of false alarms.
+#[test]
+fn a_record_in_bytes_with_earlier_turns_is_refused() {
+    #[derive(serde::Serialize)]
+    struct Earlier(stretch_core::Calibration, Option<([f64; 4], u32, [f64; 6])>);
+    for rate in [0.25, 1e-300, f64::from_bits(0x3fd0_8080_8080_8080)] {
+        let turns = ([1.24, 0.0, 0.3, 0.01], 40, [0.03, 0.012, rate, 1200.0, 0.025, -30.0]);
+        let earlier = Earlier(example_calibration(), Some(turns));
+        let mut buffer = [0; 4096];
+        let bytes = record::store(&earlier, &mut buffer).unwrap();
+        assert!(record::load::<GaugeCalibration>(bytes).is_err());
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("cal.sleeve.postcard");
+        fs::write(&path, bytes).unwrap();
+        let message = SleeveCalibration::read(&path).unwrap_err().to_string();
+        assert!(message.contains("calibrate again"), "{message}");
     }
 }
 

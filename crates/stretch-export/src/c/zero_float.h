@@ -11,13 +11,13 @@ typedef struct stretch_zero_state {
     float extreme;
     float low;
     float levels[STRETCH_ZERO_LEVELS];
-    float mean;
+    float base;
     float follow;
     float followed;
-    uint32_t ends[STRETCH_ZERO_LEVELS];
     uint32_t samples;
+    uint32_t end;
+    uint32_t first;
     uint32_t since;
-    uint32_t turned;
     uint8_t seen;
     uint8_t rises;
     uint8_t has_low;
@@ -30,8 +30,8 @@ typedef struct stretch_zero {
     float off;              /* difference from the zero of the calibration, in the signal's unit */
     float off_reference;    /* the same as a change of the estimate, in STRETCH_UNIT */
     float followed;         /* the part of it that is followed, in the signal's unit */
-    uint32_t since_samples; /* samples since the first movement that was off */
-    uint8_t shifted;        /* whether the calibration no longer describes the signal */
+    uint32_t since_samples; /* samples since the first movement after the pause with the shift */
+    uint8_t shifted;        /* whether the zero has shifted across a pause */
 } stretch_zero;
 
 static inline void stretch_zero_init(stretch_zero_state *z, int follow)
@@ -39,18 +39,18 @@ static inline void stretch_zero_init(stretch_zero_state *z, int follow)
     int k;
     for (k = 0; k < STRETCH_ZERO_LEVELS; k++) {
         z->levels[k] = 0.0f;
-        z->ends[k] = 0u;
     }
     z->before[0] = 0.0f;
     z->before[1] = 0.0f;
     z->extreme = 0.0f;
     z->low = 0.0f;
-    z->mean = 0.0f;
+    z->base = STRETCH_ZERO_LEVEL;
     z->follow = follow ? STRETCH_ZERO_FOLLOW : 0.0f;
     z->followed = 0.0f;
     z->samples = 0u;
+    z->end = 0u;
+    z->first = 0u;
     z->since = 0u;
-    z->turned = 0u;
     z->seen = 0u;
     z->rises = 1u;
     z->has_low = 0u;
@@ -124,17 +124,22 @@ STRETCH_INLINE float stretch_zero_median(const stretch_zero_state *z)
     return sorted[STRETCH_ZERO_LEVELS / 2];
 }
 
-/* The end of the first of the last movements whose level is off by at least half as much as their median. */
-STRETCH_INLINE uint32_t stretch_zero_first(const stretch_zero_state *z, float off)
+/* Whether a level differs from another one by more than is usual. */
+STRETCH_INLINE int stretch_zero_beyond(float level, float from)
 {
-    const float half = 0.5f * off;
-    int k;
-    for (k = 0; k < STRETCH_ZERO_LEVELS; k++) {
-        if ((z->levels[k] - STRETCH_ZERO_LEVEL - half) * off >= 0.0f) {
-            return z->ends[k];
-        }
+    return level - from > STRETCH_ZERO_LIMIT || level - from < -STRETCH_ZERO_LIMIT;
+}
+
+/* Compares the levels after a pause with those before it. */
+STRETCH_INLINE void stretch_zero_compare(stretch_zero_state *z)
+{
+    const float middle = stretch_zero_median(z);
+    if (z->shifted) {
+        z->shifted = stretch_zero_beyond(middle, STRETCH_ZERO_LEVEL) ? 1u : 0u;
+    } else if (stretch_zero_beyond(middle, z->base)) {
+        z->shifted = 1u;
+        z->since = z->first;
     }
-    return z->samples;
 }
 
 /* A sample minus the followed zero. Pass the result to stretch_step. */
@@ -143,52 +148,44 @@ static inline float stretch_zero_corrected(const stretch_zero_state *z, float sa
     return sample - STRETCH_ZERO_SIGN * z->followed;
 }
 
-/* Takes a sample in the unit of the signal. Returns 1 if a movement has ended, from the fifth on. */
+/* Takes a sample in the unit of the signal. Returns 1 if a movement has ended, from the fifth after a pause on. */
 static STRETCH_APART int stretch_zero_step(stretch_zero_state *z, float sample, stretch_zero *told)
 {
-    float level = 0.0f, off = 0.0f, limit, share, clipped, before;
-    int whole, jumped, lasts, shifted, k;
+    float level = 0.0f, off, clipped;
+    int k;
     z->samples += 1u;
     if (!stretch_usable(sample) || !stretch_zero_turn(z, STRETCH_ZERO_SIGN * sample, &level)) {
         return 0;
     }
+    if (z->samples - z->end > STRETCH_ZERO_PAUSE) {
+        if (z->held == STRETCH_ZERO_LEVELS) {
+            z->base = stretch_zero_median(z);
+        }
+        z->held = 0u;
+    }
+    z->end = z->samples;
+    if (z->held == 0u) {
+        z->first = z->samples;
+    }
     for (k = 1; k < STRETCH_ZERO_LEVELS; k++) {
         z->levels[k - 1] = z->levels[k];
-        z->ends[k - 1] = z->ends[k];
     }
     z->levels[STRETCH_ZERO_LEVELS - 1] = level;
-    z->ends[STRETCH_ZERO_LEVELS - 1] = z->samples;
+    clipped = stretch_within(level - STRETCH_ZERO_LEVEL - z->followed, STRETCH_ZERO_MOST);
+    z->followed = stretch_within(z->followed + z->follow * clipped, STRETCH_ZERO_LIMIT);
+    /* the levels are compared once after each pause */
     if (z->held < STRETCH_ZERO_LEVELS) {
         z->held = (uint8_t)(z->held + 1u);
+        if (z->held < STRETCH_ZERO_LEVELS) {
+            return 0;
+        }
+        stretch_zero_compare(z);
     }
-    whole = z->held == STRETCH_ZERO_LEVELS;
-    if (whole) {
-        off = stretch_zero_median(z) - STRETCH_ZERO_LEVEL;
-    }
-    clipped = stretch_within(level - STRETCH_ZERO_LEVEL - z->followed, STRETCH_ZERO_MOST);
-    before = z->mean;
-    z->mean = before + STRETCH_ZERO_MEAN_SHARE * (clipped - before);
-    if ((z->mean > 0.0f) != (before > 0.0f)) {
-        z->turned = z->samples;
-    }
-    /* a shifted zero counts as restored only within half of the limits */
-    share = z->shifted ? 0.5f : 1.0f;
-    limit = share * STRETCH_ZERO_LIMIT;
-    jumped = whole && (off - z->followed > limit || off - z->followed < -limit);
-    lasts = whole && (z->mean > share * STRETCH_ZERO_MEAN_LIMIT ||
-                      z->mean < -(share * STRETCH_ZERO_MEAN_LIMIT));
-    if (!jumped && !lasts) {
-        z->followed = stretch_within(z->followed + z->follow * clipped, STRETCH_ZERO_LIMIT);
-    }
-    shifted = jumped || lasts || z->followed >= limit || z->followed <= -limit;
-    if (shifted && !z->shifted) {
-        z->since = jumped ? stretch_zero_first(z, off) : z->turned;
-    }
-    z->shifted = shifted ? 1u : 0u;
+    off = stretch_zero_median(z) - STRETCH_ZERO_LEVEL;
     told->off = STRETCH_ZERO_SIGN * off;
     told->off_reference = STRETCH_ZERO_REFERENCE * off;
     told->followed = STRETCH_ZERO_SIGN * z->followed;
-    told->since_samples = shifted ? z->samples - z->since : 0u;
+    told->since_samples = z->shifted ? z->samples - z->since : 0u;
     told->shifted = z->shifted;
-    return whole;
+    return 1;
 }

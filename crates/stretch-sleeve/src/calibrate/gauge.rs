@@ -17,6 +17,7 @@ pub struct LiveGauge {
     watch: Option<(ZeroWatch<f64>, ZeroMemory<f64>)>,
     zero: Option<Zero<f64>>,
     last_s: Option<f64>,
+    period_s: f64,
 }
 
 impl LiveGauge {
@@ -25,12 +26,14 @@ impl LiveGauge {
     /// # Errors
     /// As [`LiveReceptor::new`].
     pub fn new(gauge: &GaugeCalibration) -> Result<Self, CalibrateError> {
+        let spec = gauge.calibration().spec();
         let watch = gauge.turns().map(|turns| {
-            let watch = ZeroWatch::new(gauge.calibration().spec().polarity, turns);
+            let watch = ZeroWatch::new(spec.polarity, spec.sample_rate_hz, turns);
             (watch, watch.memory())
         });
         let receptor = LiveReceptor::new(gauge.calibration())?;
-        Ok(Self { receptor, watch, zero: None, last_s: None })
+        let period_s = spec.sample_rate_hz.period_s();
+        Ok(Self { receptor, watch, zero: None, last_s: None, period_s })
     }
 
     /// Returns the same receptor, which also follows a slow drift of the signal's zero and subtracts it from the
@@ -59,13 +62,20 @@ impl LiveGauge {
     /// # Errors
     /// [`Withheld`] if there is no reading for the sample.
     pub fn step(&mut self, time_s: f64, signal: f64) -> Result<Reading, Withheld> {
-        if time_s.is_finite() && self.last_s.replace(time_s).is_some_and(|last_s| time_s <= last_s)
+        let mut periods = 1.0;
+        if time_s.is_finite()
+            && let Some(last_s) = self.last_s.replace(time_s)
         {
-            // Restart the watch if a stamp repeats or goes back, as the receptor does.
-            self.watch = self.watch.map(|(watch, _)| (watch, watch.memory()));
+            periods = ((time_s - last_s) / self.period_s).round();
+            if time_s <= last_s {
+                // Restart the watch if a stamp repeats or goes back, as the receptor does.
+                self.watch = self.watch.map(|(watch, _)| (watch, watch.memory()));
+            }
         }
         let mut corrected = signal;
         if let Some((watch, memory)) = &mut self.watch {
+            // The samples that are missing before this one count as time.
+            watch.lose(memory, (periods - 1.0) as u32);
             self.zero = watch.step(memory, signal);
             corrected = watch.corrected(memory, signal);
         }

@@ -17,7 +17,7 @@ use super::{
     array::{Still, watched},
     bank::{BANK, Bank},
     channels::Channels,
-    turns::find_turns,
+    turns::{find_turns, with_limit_of},
 };
 
 /// Ridge penalty of the regression of a lost channel on the remaining ones, as a share of a term's power.
@@ -40,6 +40,8 @@ pub(crate) struct Linear {
     pub(crate) variance: f64,
     pub(crate) samples: u64,
     pub(crate) still: Still,
+    /// Largest changes of the zero in the sessions of a prior.
+    pub(crate) zero_moves: Vec<f64>,
 }
 
 impl Linear {
@@ -57,6 +59,7 @@ impl Linear {
                 let signals: Vec<&[f64]> = stretches.map(|own| own.signals[0].as_slice()).collect();
                 let one = self.one(provenance)?;
                 let turns = find_turns(&one, &signals);
+                let turns = turns.map(|turns| with_limit_of(turns, &self.zero_moves));
                 Ok(SleeveCalibration::One(Box::new(GaugeCalibration::new(one, turns)?)))
             }
             _ => Ok(SleeveCalibration::Many(Box::new(self.many(channels, shifts, provenance)?))),

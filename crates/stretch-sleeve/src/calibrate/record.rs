@@ -19,6 +19,9 @@ const POSTCARD_BYTES: usize = 1 << 16;
 /// Ending of the name of a postcard file that contains more than a calibration.
 const SLEEVE_ENDING: &str = ".sleeve.postcard";
 
+/// Problem of a file with turning points of an earlier form, which has a limit for a running mean.
+const EARLIER_TURNS: &str = "its field turns was written by an earlier release; calibrate again";
+
 /// A calibration of one gauge or of several.
 ///
 /// The JSON file of one gauge contains a calibration and the additional field `turns` (turning
@@ -126,7 +129,11 @@ impl GaugeCalibration {
         calibration: Calibration,
     ) -> Result<Self, CalibrateError> {
         let (object, _) = digest::split(text);
-        let Beside { turns } = digest::parse(&object).map_err(|error| unusable(name, error))?;
+        let Beside { turns } =
+            digest::parse(&object).map_err(|error| match object.contains("\"mean_limit\"") {
+                true => unusable(name, EARLIER_TURNS),
+                false => unusable(name, error),
+            })?;
         Self::new(calibration, turns).map_err(|error| unusable(name, error))
     }
 

@@ -1,20 +1,28 @@
-//! Finds the turning points of the movements in a calibration, and the limits for later movements.
+//! Finds the turning points of the movements in a calibration, and the limit for a shift of later movements.
 
 use stretch_calibrate::{
     CalibrateError, Options,
     toolkit::{even_signals, extent, noise},
 };
-use stretch_core::{Calibration, Interval, Model, Runner, Volts};
+use stretch_core::{Calibration, Interval, Model, Runner, SampleRate, Volts};
 use stretch_data::Trial;
 use stretch_metrics::student_t::critical;
 use stretch_receptor::Receptor;
 
 use crate::{GaugeCalibration, TurnFinder, Turns};
 
-use super::channels::{Levels, independent, levels};
+use super::{
+    channels::{Levels, independent, levels},
+    prior::LEAST_SESSIONS,
+};
 
-/// Rate of false alarms per hour, the same as that with which one of several gauges is reported as shifted.
-const FALSE_ALARMS_AN_HOUR: f64 = 0.25;
+/// Share of pauses across which a zero without a shift is reported as shifted, if levels are independent and normal. A
+/// recording has few pauses, so one false report in a hundred of them is rare. A smaller share would miss more shifts.
+const FALSE_SHARE: f64 = 0.01;
+/// Shortest time without the end of a movement that is a pause, s. A sensor is not put on again in less time.
+const LEAST_PAUSE_S: f64 = 4.0;
+/// Shortest pause, in median times between the ends of movements, so that a slow movement is not a pause.
+const LEAST_PAUSE: f64 = 4.0;
 /// Smallest span of a movement, as a share of the signal's range without the lowest and highest 5 % of the samples.
 const LEAST_SPAN: f64 = 1.0 / 3.0;
 /// Number of bins in the histogram of samples.
@@ -25,8 +33,7 @@ const LEAST_NOISES: f64 = 6.0;
 const LEAST_MOVEMENTS: f64 = 8.0;
 /// Variance of the median of five normal values, divided by that of one value.
 const MEDIAN_VARIANCE: f64 = 0.2868;
-/// Largest gain with which a zero is followed. With a larger gain, the median of five could not detect a shift before
-/// the followed zero absorbs it.
+/// Largest gain with which a zero is followed. With a larger gain the zero would follow the scatter of single levels.
 const MOST_FOLLOW: f64 = 0.2;
 /// Time for which a constant signal is held, so that the memory of a model has faded.
 const HELD_S: f64 = 5.0;
@@ -51,28 +58,79 @@ pub fn calibrate_gauge(
 /// Finds the turning points in signals. Each signal is a stretch without a gap. Returns `None` if there are too few
 /// movements.
 pub fn find_turns(calibration: &Calibration, signals: &[&[f64]]) -> Option<Turns> {
+    let sign = calibration.spec().polarity.sign();
+    let (learnt, ends) = learn(signals, sign, calibration.spec().sample_rate_hz)?;
+    let level = sign * learnt.level;
+    let ends = ends.map(|end| sign * end);
+    let ends = Interval { min: ends[0].min(ends[1]), max: ends[0].max(ends[1]) };
+    let reference_per_signal = slope(calibration, level, ends)?;
+    let turns = Turns { level, reference_per_signal, ..learnt };
+    Some(turns).filter(|turns| turns.validate().is_ok())
+}
+
+/// Returns the largest change of the zero within a session in which the sensor was not put on again, in standard
+/// deviations of levels. The first half of the session is used as a calibration. The change is the largest difference in
+/// the second half between two medians of five consecutive levels, or between one of them and the calibration's level.
+/// A watch of the second half cannot see a larger difference, wherever the session has pauses. Returns `None` if either
+/// half has too few movements.
+///
+/// Signals are multiplied by `sign`, the sign of the polarity.
+pub(crate) fn zero_move(signals: &[&[f64]], sign: f64, rate: SampleRate) -> Option<f64> {
+    let mut left = signals.iter().map(|signal| signal.len()).sum::<usize>() / 2;
+    let (mut first, mut second) = (Vec::new(), Vec::new());
+    for signal in signals {
+        let (before, after) = signal.split_at(left.min(signal.len()));
+        left -= before.len();
+        first.extend((!before.is_empty()).then_some(before));
+        second.push(after);
+    }
+    let (turns, _) = learn(&first, sign, rate)?;
+    let finder = TurnFinder::new(turns.least_span);
+    let mut memory = finder.memory();
+    let ends = second.into_iter().flatten().filter_map(|v| finder.step(&mut memory, sign * v));
+    let levels: Vec<f64> = ends.map(|ends| level(ends, turns.high_share)).collect();
+    zero_span(&levels, &turns)
+}
+
+/// Returns the range of the medians of five consecutive levels and of the calibration's level, in standard deviations of
+/// levels; `None` if there are fewer than five levels.
+fn zero_span(levels: &[f64], turns: &Turns) -> Option<f64> {
+    let medians = levels.windows(Turns::MEDIAN_OF).filter_map(|own| median(own.to_vec()));
+    let range = extent(medians.chain([turns.level]));
+    (levels.len() >= Turns::MEDIAN_OF).then(|| (range.max - range.min) / turns.scatter)
+}
+
+/// Returns the turning points with the limit of a prior: the largest of the changes of the zero in its sessions
+/// ([`zero_move`]). Without enough sessions the turning points keep their own limit.
+pub(crate) fn with_limit_of(turns: Turns, zero_moves: &[f64]) -> Turns {
+    if zero_moves.len() < LEAST_SESSIONS {
+        return turns;
+    }
+    let most = zero_moves.iter().copied().fold(0.0, f64::max);
+    Turns { limit: most * turns.scatter, sessions: zero_moves.len() as u32, ..turns }
+}
+
+/// Returns the statistics of the movements in signals, and their mean low and high end. Signals are multiplied by `sign`,
+/// the sign of the polarity. The field `reference_per_signal` is still zero.
+fn learn(signals: &[&[f64]], sign: f64, rate: SampleRate) -> Option<(Turns, [f64; 2])> {
     let finder = TurnFinder::new(LEAST_SPAN * middle_span(signals)?);
     // Noise as large as a movement would be mistaken for movements.
     if finder.least_span <= LEAST_NOISES * noise(signals.iter().copied()) {
         return None;
     }
-    let sign = calibration.spec().polarity.sign();
-    let movements: Vec<Vec<(f64, f64)>> = signals
-        .iter()
-        .map(|signal| {
-            let mut memory = finder.memory();
-            signal.iter().filter_map(|v| finder.step(&mut memory, sign * v)).collect()
-        })
-        .collect();
-    let samples: usize = signals.iter().map(|signal| signal.len()).sum();
-    let hours = samples as f64 * calibration.spec().sample_rate_hz.period_s() / 3600.0;
-    let (learnt, ends) = measure_levels(&movements, hours)?;
-    let level = sign * learnt.level;
-    let ends = ends.map(|end| sign * end);
-    let ends = Interval { min: ends[0].min(ends[1]), max: ends[0].max(ends[1]) };
-    let reference_per_signal = slope(calibration, level, ends)?;
-    let turns = Turns { level, least_span: finder.least_span, reference_per_signal, ..learnt };
-    Some(turns).filter(|turns| turns.validate().is_ok())
+    let (mut movements, mut periods) = (Vec::new(), Vec::new());
+    for signal in signals {
+        let mut memory = finder.memory();
+        let ends = signal.iter().map(|v| finder.step(&mut memory, sign * v)).enumerate();
+        let (at, own): (Vec<usize>, Vec<(f64, f64)>) =
+            ends.filter_map(|(at, ends)| Some((at, ends?))).unzip();
+        periods.extend(at.windows(2).map(|pair| (pair[1] - pair[0]) as f64 * rate.period_s()));
+        movements.push(own);
+    }
+    let (learnt, ends) = measure_levels(&movements)?;
+    // If every stretch has a single movement, the time between movements is unknown.
+    let pause_s = median(periods).map_or(LEAST_PAUSE_S, |s| LEAST_PAUSE_S.max(LEAST_PAUSE * s));
+    Some((Turns { least_span: finder.least_span, pause_s, ..learnt }, ends))
 }
 
 /// Returns the span of the samples without the lowest and the highest 5 %, to the resolution of the histogram.
@@ -97,15 +155,20 @@ fn middle_span(signals: &[&[f64]]) -> Option<f64> {
     (low < high).then(|| (high - low) as f64 / PARTS as f64 * (max - min))
 }
 
+/// Returns the level of a movement with these low and high ends.
+fn level((low, high): (f64, f64), high_share: f64) -> f64 {
+    (1.0 - high_share) * low + high_share * high
+}
+
 /// Returns the statistics of the levels of movements, and the mean low and high end. Each list in `movements` comes
-/// from one stretch without gaps, and all were recorded in `hours`. Signals are multiplied by the sign of the polarity.
-/// The fields `least_span` and `reference_per_signal` are still zero.
-fn measure_levels(movements: &[Vec<(f64, f64)>], hours: f64) -> Option<(Turns, [f64; 2])> {
+/// from one stretch without gaps. The fields `least_span`, `pause_s` and `reference_per_signal` are still zero.
+fn measure_levels(movements: &[Vec<(f64, f64)>]) -> Option<(Turns, [f64; 2])> {
     let all: Vec<(f64, f64)> = movements.iter().flatten().copied().collect();
     let (low, high, high_share) = weighted(&all)?;
-    let level = |(low, high): &(f64, f64)| (1.0 - high_share) * low + high_share * high;
-    let sequences: Vec<Vec<f64>> =
-        movements.iter().map(|own| own.iter().map(level).collect()).collect();
+    let sequences: Vec<Vec<f64>> = movements
+        .iter()
+        .map(|own| own.iter().map(|&ends| level(ends, high_share)).collect())
+        .collect();
     let Levels { mean, variance, alike, count } = levels(&sequences)?;
     // The estimate of a correlation is too low by (1 + 4 r)/n (Kendall, Biometrika 41 (1954) 403).
     let alike = (alike + (1.0 + 4.0 * alike) / count).clamp(0.0, 0.99);
@@ -113,27 +176,27 @@ fn measure_levels(movements: &[Vec<(f64, f64)>], hours: f64) -> Option<(Turns, [
     if !(independent >= LEAST_MOVEMENTS && variance > 0.0) {
         return None;
     }
-    let movements_an_hour = count / hours;
-    // Half of the alarms are for the median, half for the running mean.
-    let share = 0.5 * FALSE_ALARMS_AN_HOUR / movements_an_hour;
-    let t = critical(share, (independent - 1.0).floor());
-    let spread = |variance: f64| t * scatter * (variance + 1.0 / independent).sqrt();
-    let mean_variance = Turns::MEAN_SHARE / (2.0 - Turns::MEAN_SHARE) * count / independent;
-    let level = clipped_mean(&sequences, mean, Turns::MOST_INNOVATION * scatter);
+    let t = critical(FALSE_SHARE, (independent - 1.0).floor());
     let learnt = Turns {
-        level,
+        level: clipped_mean(&sequences, mean, Turns::MOST_INNOVATION * scatter),
         high_share,
         least_span: 0.0,
         scatter,
         movements: count as u32,
-        limit: spread(median_variance(alike)).max(tail(&sequences, level, share)),
-        mean_limit: spread(mean_variance.min(1.0)),
-        false_alarms_an_hour: FALSE_ALARMS_AN_HOUR,
-        movements_an_hour,
+        // The medians before and after a pause both scatter.
+        limit: t * scatter * (2.0 * median_variance(alike)).sqrt(),
+        pause_s: 0.0,
+        sessions: 0,
         follow: follow(&sequences, count, variance),
         reference_per_signal: 0.0,
     };
     Some((learnt, [low, high]))
+}
+
+/// Returns the median; `None` if there are no values. Of an even number of values it is the larger one in the middle.
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
 }
 
 /// Returns the mean low and high ends, and the weight of the high end with which levels scatter least. The weight is
@@ -165,18 +228,6 @@ fn clipped_mean(sequences: &[Vec<f64>], mean: f64, most: f64) -> f64 {
         level + off.sum::<f64>() / count
     };
     (0..50).fold(mean, |level, _| moved(level))
-}
-
-/// Returns the deviation that the median of five levels exceeds with probability `share`, for any distribution of
-/// levels. If a share `q` of the levels exceeds the deviation on one side, the median does so with probability `share/2
-/// = 10 q^3`, up to terms in `q^4` (David and Nagaraja, Order Statistics, 2003, section 2.1). The `j`-th largest of `n`
-/// levels is exceeded with probability `j/(n + 1)`.
-fn tail(sequences: &[Vec<f64>], mean: f64, share: f64) -> f64 {
-    let mut off: Vec<f64> = sequences.iter().flatten().map(|level| level - mean).collect();
-    off.sort_by(f64::total_cmp);
-    let beyond = (share / 20.0).cbrt() * (off.len() + 1) as f64;
-    let rank = (beyond as usize).clamp(1, off.len());
-    off[off.len() - rank].max(-off[rank - 1])
 }
 
 /// Returns the variance of the median of five levels divided by that of one level, if neighbours have the correlation

@@ -1,6 +1,6 @@
 //! Checks whether the zero of a single gauge is still that of its calibration.
 
-use stretch_core::{Design, Polarity, Real};
+use stretch_core::{Design, Polarity, Real, SampleRate};
 
 use crate::Turns;
 
@@ -84,34 +84,35 @@ impl<T: Real> TurnFinder<T> {
     }
 }
 
-/// Detector of a shift of a single gauge's zero from that of its calibration, by the levels at which its signal turns.
-/// On request it also follows a slow drift of the zero.
+/// Detector of a shift of a single gauge's zero across a pause, by the levels at which its signal turns. On request it
+/// also follows a slow drift of the zero.
 ///
 /// A movement's level `y` is the weighted mean of its two turning points ([`Turns`]). At the end of each movement `off`
-/// is reported: the median of the last five levels minus the level in the calibration. The zero has shifted if `off`
-/// exceeds `limit`, or if the running mean of the levels' deviations exceeds `mean_limit`, in either direction. The
-/// calibration states the rate of false alarms. A shift beyond `limit` is found after three movements, a shift beyond
-/// `mean_limit` after ten to thirty. The shift is reported until both values, and a followed zero, are within half of
-/// their limits.
+/// is reported: the median of the last five levels minus the level in the calibration.
+///
+/// A sensor is not put on again within a running movement. The detector therefore compares levels only across a pause:
+/// a time of more than `pause_samples` without the end of a movement, or the start. Missing samples count as time. When
+/// five movements have ended after the pause, their median is compared with the median of the last five levels before
+/// the pause, or with the level in the calibration if there are none. The zero has shifted if the difference exceeds
+/// `limit`. The shift is reported until the median after a later pause is within `limit` of the level in the
+/// calibration. A drift within a running movement is not reported as a shift, but it shows in `off`.
 ///
 /// A followed zero `z` is the state of a scalar Kalman filter with its steady gain `k`: `z += k clip(y - level - z)`.
-/// Innovations are clipped at two standard deviations of levels, and `z` is clipped at the limit. The deviations in the
-/// running mean are then those from `level + z`, and a shift is reported if `off - z` exceeds the limit. A shift is
-/// also reported if `z` is at the limit, because the calibration has not seen larger shifts. A zero that has shifted by
-/// more than a limit is not followed.
+/// Innovations are clipped at two standard deviations of levels, and `z` is clipped at the limit, because the
+/// calibration has not seen larger changes.
 ///
-/// This assumes that movements return to the ends that they had in the calibration. A movement that does not looks like
-/// a shift. Without movements nothing is reported.
+/// This assumes that movements return to the ends that they had before. A movement that does not looks like a shift.
+/// Without movements nothing is reported.
 ///
 /// ```
-/// use stretch_core::{Design, Polarity};
+/// use stretch_core::{Design, Polarity, SampleRate};
 /// use stretch_sleeve::{Turns, ZeroWatch};
 /// // a gauge that rests at 1.24 V, 0.03 mm a millivolt
 /// let turns = Turns {
-///     level: 1.24, high_share: 0.0, least_span: 0.2, scatter: 0.01, movements: 40, limit: 0.03, mean_limit: 0.012,
-///     false_alarms_an_hour: 0.25, movements_an_hour: 1800.0, follow: 0.025, reference_per_signal: -30.0,
+///     level: 1.24, high_share: 0.0, least_span: 0.2, scatter: 0.01, movements: 40, limit: 0.03, pause_s: 8.0,
+///     sessions: 0, follow: 0.025, reference_per_signal: -30.0,
 /// };
-/// let watch = ZeroWatch::<f32>::new(Polarity::Rising, &turns);
+/// let watch = ZeroWatch::<f32>::new(Polarity::Rising, SampleRate::new(100.0)?, &turns);
 /// let mut memory = watch.memory();
 /// let mut last = None;
 /// for n in 0..2000 {
@@ -121,6 +122,7 @@ impl<T: Real> TurnFinder<T> {
 /// }
 /// let zero = last.expect("five movements have ended");
 /// assert!(zero.has_shifted && (zero.off_reference + 7.5).abs() < 0.3);
+/// # Ok::<(), stretch_core::DesignError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroWatch<T> {
@@ -132,12 +134,10 @@ pub struct ZeroWatch<T> {
     pub shares: [T; 2],
     /// The level of the calibration, times `sign`.
     pub level: T,
-    /// Largest deviation of the median of levels.
+    /// Largest usual difference of the median of levels across a pause.
     pub limit: T,
-    /// Largest deviation of the running mean of levels.
-    pub mean_limit: T,
-    /// Weight of the newest level in the running mean.
-    pub mean_share: T,
+    /// Largest number of samples between the ends of two movements without a pause.
+    pub pause_samples: u32,
     /// Limit at which an innovation is clipped.
     pub most: T,
     /// Share of an innovation by which the zero moves; 0 if the zero is not followed.
@@ -146,16 +146,20 @@ pub struct ZeroWatch<T> {
     pub reference: T,
 }
 
-/// Memory of a [`ZeroWatch`]: the current movement, the last levels, and the followed zero.
+/// Memory of a [`ZeroWatch`]: the current movement, the levels since the last pause, and the followed zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroMemory<T> {
     turns: TurnMemory<T>,
     levels: [T; LEVELS],
-    ends: [u32; LEVELS],
+    /// Number of levels since the last pause, at most five.
     held: u8,
     samples: u32,
-    mean: T,
-    turned: u32,
+    /// End of the last movement, in samples.
+    end: u32,
+    /// End of the first movement after the last pause, in samples.
+    first: u32,
+    /// Median of the levels before the last pause.
+    base: T,
     followed: T,
     since: Option<u32>,
 }
@@ -170,10 +174,10 @@ pub struct Zero<T> {
     pub off_reference: T,
     /// Followed part of the deviation, in the signal's unit; 0 if the zero is not followed.
     pub followed: T,
-    /// Whether the calibration no longer describes the signal.
+    /// Whether the zero has shifted across a pause, so that the calibration no longer describes the signal.
     pub has_shifted: bool,
-    /// Number of samples since the end of the first movement that deviates, or since the running mean changed its sign;
-    /// 0 without a shift.
+    /// Number of samples since the end of the first movement after the pause across which the zero has shifted; 0
+    /// without a shift.
     pub since_samples: u32,
 }
 
@@ -184,11 +188,11 @@ impl<T: Real> Design for ZeroWatch<T> {
         ZeroMemory {
             turns: self.finder.memory(),
             levels: [T::zero(); LEVELS],
-            ends: [0; LEVELS],
             held: 0,
             samples: 0,
-            mean: T::zero(),
-            turned: 0,
+            end: 0,
+            first: 0,
+            base: self.level,
             followed: T::zero(),
             since: None,
         }
@@ -196,8 +200,9 @@ impl<T: Real> Design for ZeroWatch<T> {
 }
 
 impl<T: Real> ZeroWatch<T> {
-    /// Creates the detector for a gauge with these turning points and the polarity of its calibration.
-    pub fn new(polarity: Polarity, turns: &Turns) -> Self {
+    /// Creates the detector for a gauge with these turning points, and the polarity and the sample rate of its
+    /// calibration.
+    pub fn new(polarity: Polarity, sample_rate: SampleRate, turns: &Turns) -> Self {
         let sign = polarity.sign();
         Self {
             finder: TurnFinder::new(T::from_f64(turns.least_span)),
@@ -205,8 +210,7 @@ impl<T: Real> ZeroWatch<T> {
             shares: [T::from_f64(1.0 - turns.high_share), T::from_f64(turns.high_share)],
             level: T::from_f64(sign * turns.level),
             limit: T::from_f64(turns.limit),
-            mean_limit: T::from_f64(turns.mean_limit),
-            mean_share: T::from_f64(Turns::MEAN_SHARE),
+            pause_samples: (turns.pause_s * sample_rate.hz()) as u32,
             most: T::from_f64(Turns::MOST_INNOVATION * turns.scatter),
             follow: T::zero(),
             reference: T::from_f64(sign * turns.reference_per_signal),
@@ -225,58 +229,61 @@ impl<T: Real> ZeroWatch<T> {
         sample - self.sign * memory.followed
     }
 
-    /// Takes a sample. Returns a result at the end of each movement, from the fifth on. A missing sample changes
-    /// nothing but the sample count.
+    /// Takes a number of missing samples.
+    pub fn lose(&self, memory: &mut ZeroMemory<T>, samples: u32) {
+        memory.samples = memory.samples.wrapping_add(samples);
+    }
+
+    /// Takes a sample. Returns a result at the end of each movement, from the fifth after a pause on. A missing sample
+    /// changes nothing but the sample count.
     pub fn step(&self, memory: &mut ZeroMemory<T>, sample: T) -> Option<Zero<T>> {
-        memory.samples = memory.samples.wrapping_add(1);
+        self.lose(memory, 1);
         if !is_usable(sample) {
             return None;
         }
         let (low, high) = self.finder.step(&mut memory.turns, self.sign * sample)?;
         let level = self.shares[0] * low + self.shares[1] * high;
+        if memory.samples.wrapping_sub(memory.end) > self.pause_samples {
+            if usize::from(memory.held) == LEVELS {
+                memory.base = median(memory.levels);
+            }
+            memory.held = 0;
+        }
+        memory.end = memory.samples;
+        if memory.held == 0 {
+            memory.first = memory.samples;
+        }
         memory.levels.rotate_left(1);
-        memory.ends.rotate_left(1);
         memory.levels[LEVELS - 1] = level;
-        memory.ends[LEVELS - 1] = memory.samples;
+        let clipped = (level - self.level - memory.followed).max(-self.most).min(self.most);
+        let moved = memory.followed + self.follow * clipped;
+        memory.followed = moved.max(-self.limit).min(self.limit);
+        // The levels are compared once after each pause.
         if usize::from(memory.held) < LEVELS {
             memory.held += 1;
+            if usize::from(memory.held) < LEVELS {
+                return None;
+            }
+            self.compare(memory);
         }
-        let whole = usize::from(memory.held) == LEVELS;
-        let off = if whole { median(memory.levels) - self.level } else { T::zero() };
-        let innovation = level - self.level - memory.followed;
-        let clipped = innovation.max(-self.most).min(self.most);
-        let before = memory.mean;
-        memory.mean = before + self.mean_share * (clipped - before);
-        if (memory.mean > T::zero()) != (before > T::zero()) {
-            memory.turned = memory.samples;
-        }
-        // A reported shift ends within half of the limits.
-        let share = if memory.since.is_some() { T::from_f64(0.5) } else { T::one() };
-        let jumped = whole && (off - memory.followed).abs() > share * self.limit;
-        let lasts = whole && memory.mean.abs() > share * self.mean_limit;
-        if !jumped && !lasts {
-            let moved = memory.followed + self.follow * clipped;
-            memory.followed = moved.max(-self.limit).min(self.limit);
-        }
-        let has_shifted = jumped || lasts || memory.followed.abs() >= share * self.limit;
-        let began = || if jumped { self.first(memory, off) } else { memory.turned };
-        memory.since = has_shifted.then(|| memory.since.unwrap_or_else(began));
-        whole.then(|| Zero {
+        let off = median(memory.levels) - self.level;
+        Some(Zero {
             off: self.sign * off,
             off_reference: self.reference * off,
             followed: self.sign * memory.followed,
-            has_shifted,
+            has_shifted: memory.since.is_some(),
             since_samples: memory.since.map_or(0, |since| memory.samples.wrapping_sub(since)),
         })
     }
 
-    /// Returns the end of the earliest of the last five movements whose level deviates by at least half as much as the
-    /// median.
-    fn first(&self, memory: &ZeroMemory<T>, off: T) -> u32 {
-        let half = T::from_f64(0.5) * off;
-        let is_off = |level: &T| (*level - self.level - half) * off >= T::zero();
-        let mut at = memory.levels.iter().zip(memory.ends).filter(|(level, _)| is_off(level));
-        at.next().map_or(memory.samples, |(_, end)| end)
+    /// Compares the levels after a pause with those before it.
+    fn compare(&self, memory: &mut ZeroMemory<T>) {
+        let middle = median(memory.levels);
+        let is_beyond = |from: T| (middle - from).abs() > self.limit;
+        memory.since = match memory.since {
+            None => is_beyond(memory.base).then_some(memory.first),
+            since => since.filter(|_| is_beyond(self.level)),
+        };
     }
 }
 

@@ -99,6 +99,7 @@ pub fn calibrate_array(trials: &[Trial], options: &ArrayOptions) -> Result<Array
         variance: held.rmse * held.rmse,
         samples: count as u64,
         still: Still::of(&channels),
+        zero_moves: Vec::new(),
     };
     let shifts = shifts(&parted, &channels, &linear, &held.ridges)?;
     let mut notes = channels.notes.clone();

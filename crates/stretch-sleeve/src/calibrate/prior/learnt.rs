@@ -27,7 +27,7 @@ const CORRELATED_S: f64 = 1.0;
 /// Smallest absolute correlation whose sign can be trusted.
 pub(crate) const CLEAR: f64 = 0.5;
 /// Smallest number of sessions from which a spread can be learnt.
-const LEAST_SESSIONS: usize = 3;
+pub(crate) const LEAST_SESSIONS: usize = 3;
 
 /// Distribution of the coefficients of a future session, learnt from earlier ones.
 ///
@@ -71,6 +71,9 @@ pub struct Prior {
     pub(crate) still_seen: u64,
     /// Path and landmarks of each session, in normalised target.
     pub(crate) landmarks: Vec<Landmarks>,
+    /// Largest changes of the zero within sessions of a single gauge, in standard deviations of levels.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(crate) zero_moves: Vec<f64>,
 }
 
 impl Prior {
@@ -103,10 +106,7 @@ impl Prior {
         let domains: Vec<_> = (0..channels).map(pooled).collect();
         let ends = sessions.iter().flat_map(|s| [s.reference_range.min, s.reference_range.max]);
         let ends = extent(ends);
-        let target = match first.reference.starts_with("length") && ends.max > 0.0 {
-            true => Target::Contraction { rest_length: ends.max },
-            false => Target::Direct,
-        };
+        let target = target_of(&first.reference, ends.max);
         let targets = extent([ends.min, ends.max].into_iter().map(|x| target.from_reference(x)));
         let Interval { min, max } = targets;
         let target_range =
@@ -153,12 +153,14 @@ impl Prior {
             still_samples: still.longest,
             still_seen: still.samples,
             landmarks: normalised_landmarks(sessions, (target, target_range)),
+            zero_moves: zero_moves(sessions),
         })
     }
 
     /// Returns a prior with the same covariances, in which the means for wearers and for the population come from these
     /// sessions. It serves to add sessions that were recorded after the prior was learnt. The sessions from which it
-    /// was learnt count only if they are given again.
+    /// was learnt count only if they are given again. The changes of the zero come from these sessions if there are
+    /// enough, otherwise from the earlier ones.
     ///
     /// # Errors
     /// As [`Prior::learn`].
@@ -176,7 +178,11 @@ impl Prior {
         let spread = Spread { levels: self.levels.clone(), noise: self.noise };
         let known = Tree::new(&paths, &leaves).known(&spread).ok_or_else(undetermined)?;
         let landmarks = normalised_landmarks(sessions, (self.target, self.target_range));
-        Ok(Self { known, landmarks, sessions: sessions.len(), ..self.clone() })
+        let mut zero_moves = zero_moves(sessions);
+        if zero_moves.len() < LEAST_SESSIONS {
+            zero_moves.clone_from(&self.zero_moves);
+        }
+        Ok(Self { known, landmarks, zero_moves, sessions: sessions.len(), ..self.clone() })
     }
 
     /// Returns the unit of the reference.
@@ -205,6 +211,18 @@ impl Prior {
         let covariance = below.iter().fold(covariance.clone(), |sum, level| sum + level);
         (Normal { mean: mean.clone(), covariance }, seen.len())
     }
+}
+
+/// Returns the target of a model of this reference: the contraction of a length, otherwise the reference itself.
+pub(crate) fn target_of(reference: &str, most: f64) -> Target {
+    match reference.starts_with("length") && most > 0.0 {
+        true => Target::Contraction { rest_length: most },
+        false => Target::Direct,
+    }
+}
+
+fn zero_moves(sessions: &[Session]) -> Vec<f64> {
+    sessions.iter().filter_map(|session| session.zero_move).collect()
 }
 
 /// Returns the number of samples that count as one.

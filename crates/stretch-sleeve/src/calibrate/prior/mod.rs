@@ -19,6 +19,7 @@ mod tree;
 mod update;
 
 pub use expected::{ErrorSpread, Expected};
+pub(crate) use learnt::LEAST_SESSIONS;
 pub use learnt::Prior;
 pub use renew::{Assumed, RenewOptions, RenewSummary, Renewed};
 pub use session::{Session, SessionOptions};

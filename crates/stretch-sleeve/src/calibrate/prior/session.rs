@@ -6,15 +6,23 @@ use stretch_calibrate::{
     CalibrateError,
     toolkit::{LinearFactor, RowAccumulator, extent},
 };
-use stretch_core::Interval;
+use stretch_core::{Interval, Target};
 use stretch_data::Trial;
 
 use crate::{
     SleeveError,
-    calibrate::{array::Still, bank::Bank, channels::Channels},
+    calibrate::{
+        array::Still,
+        bank::Bank,
+        channels::{Channels, correlation},
+        turns,
+    },
 };
 
-use super::landmarks::{LANDMARKS, at_landmarks};
+use super::{
+    landmarks::{LANDMARKS, at_landmarks},
+    learnt::target_of,
+};
 
 /// The schema of sessions and priors that this release writes and reads.
 pub(crate) const SCHEMA: u32 = 1;
@@ -81,6 +89,10 @@ pub struct Session {
     /// The reference at the [landmarks](super::landmarks).
     pub(crate) landmarks: [f64; LANDMARKS],
     pub(crate) parts: Vec<SessionPart>,
+    /// Largest change of the zero within the session, in standard deviations of levels, if the session has a single
+    /// gauge and enough movements.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(crate) zero_move: Option<f64>,
 }
 
 /// The rows between two times of a session, with the terms over the session's own domains.
@@ -122,6 +134,7 @@ impl Session {
             still_samples: Still::of(&channels).longest,
             landmarks: at_landmarks(&channels),
             parts: parts(&channels),
+            zero_move: zero_move(&channels, target_of(&options.reference, reference_range.max)),
         };
         Ok((session, channels.notes))
     }
@@ -223,9 +236,20 @@ impl Session {
         let is_good = self.domains.len() == self.signals.len()
             && self.still_samples.len() == self.signals.len()
             && self.domains.iter().all(has_domain)
-            && self.parts.iter().all(is_whole);
+            && self.parts.iter().all(is_whole)
+            && self.zero_move.is_none_or(|x| x.is_finite() && x >= 0.0);
         if is_good { Ok(()) } else { Err(problem("its numbers contradict each other")) }
     }
+}
+
+/// Returns the largest change of the zero of a single gauge, for a model of this target.
+fn zero_move(channels: &Channels, target: Target) -> Option<f64> {
+    let stretches = channels.stretches.iter();
+    let signals: Option<Vec<&[f64]>> =
+        stretches.map(|own| (own.signals.len() == 1).then(|| own.signals[0].as_slice())).collect();
+    let follows = correlation(channels.signal(0), channels.reference());
+    let sign = (follows * target.reference_per_target()).signum();
+    turns::zero_move(&signals?, sign, channels.sample_rate)
 }
 
 /// Sums up the rows of a session, part by part.

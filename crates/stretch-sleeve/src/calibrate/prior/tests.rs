@@ -133,6 +133,11 @@ fn levels_are_those_of_the_seconds_of_reference() {
         let usual = *usual.turns().unwrap();
         let own = turns(&trials);
         let (held, slope) = (*own.turns().unwrap(), usual.reference_per_signal);
+        // The limit comes from the sessions of the prior that have enough movements.
+        let most = prior.zero_moves.iter().copied().fold(0.0, f64::max);
+        let sessions = prior.zero_moves.len() as u32;
+        assert!(sessions >= 3, "{sessions}");
+        let usual = Turns { sessions, limit: most * usual.scatter, ..usual };
         assert_eq!(Turns { reference_per_signal: slope, ..held }, usual);
         assert!((held.reference_per_signal / slope - 1.0).abs() < 0.2, "{held:?}, {slope}");
         let renewed = prior.renew(&trials, &RenewOptions::default()).unwrap().calibration;
@@ -145,7 +150,44 @@ fn levels_are_those_of_the_seconds_of_reference() {
             apply_gauge(&own, &again, false).unwrap().zeros.iter().any(|(_, zero)| zero.has_shifted)
         };
         assert!(tells(2.0 * held.limit) && tells(-2.0 * held.limit) && !tells(0.0));
+        // The gauge is put on again after a minute, and the recorder does not run meanwhile.
+        let tells = |gap_s: f64| {
+            let mut again = session(9, 0, 120.0);
+            let late = again.time_s.iter_mut().zip(&mut again.channels[0].values).skip(3000);
+            late.for_each(|(time_s, x)| (*time_s, *x) = (*time_s + gap_s, *x + 3.0 * held.limit));
+            let zeros = apply_gauge(&own, &again, false).unwrap().zeros;
+            let first = zeros.iter().find(|(_, zero)| zero.has_shifted);
+            first.map(|(time_s, zero)| time_s - f64::from(zero.since_samples) / HZ)
+        };
+        assert_eq!(tells(0.0), None);
+        assert!(tells(60.0).is_some_and(|since_s| (120.0..130.0).contains(&since_s)));
     }
+}
+
+#[test]
+fn changes_of_the_zero_come_from_new_sessions_if_there_are_enough() {
+    let session = |number: usize| summed(number / 3, number % 3, &["s1"]);
+    let has_move = |session: &Session| session.zero_move.is_some();
+    let all: Vec<Session> = (0..15).map(session).filter(has_move).collect();
+    let (earlier, later) = all.split_at(4);
+    let moves = |sessions: &[Session]| -> Vec<f64> {
+        sessions.iter().filter_map(|session| session.zero_move).collect()
+    };
+    let prior = Prior::learn(earlier).unwrap();
+    assert_eq!(prior.zero_moves, moves(earlier));
+    assert_eq!(prior.knowing(later).unwrap().zero_moves, moves(later));
+    // Files of earlier releases lack these numbers.
+    let mut later = later.to_vec();
+    for session in &mut later {
+        session.zero_move = None;
+        let text = session.to_json().unwrap();
+        assert!(!text.contains("zero_move"), "{text}");
+    }
+    assert_eq!(prior.knowing(&later).unwrap().zero_moves, prior.zero_moves);
+    let without = Prior::learn(&later).unwrap();
+    assert!(without.zero_moves.is_empty() && !without.to_json().unwrap().contains("zero_moves"));
+    // Two gauges are compared with each other.
+    assert_eq!(summed(0, 0, &["s1", "s2"]).zero_move, None);
 }
 
 #[test]

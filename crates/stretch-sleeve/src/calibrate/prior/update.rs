@@ -162,6 +162,7 @@ impl Prior {
             variance,
             still: self.still(),
             samples: 0,
+            zero_moves: self.zero_moves.clone(),
         }
     }
 

@@ -218,6 +218,33 @@ fn a_prior_needs_seconds_of_reference_or_none() {
 }
 
 #[test]
+fn a_single_gauge_that_is_put_on_again_is_reported_with_what_is_usual() {
+    let scratch = Scratch::new();
+    let worn = |wearer: usize| Worn { wearer, number: 0, seconds: 200.0, hz: 50.0 };
+    let session = |wearer: usize| scratch.summed(&format!("w{wearer}"), worn(wearer), "s1", |_| ());
+    let sessions: Vec<PathBuf> = (0..4).map(session).collect();
+    runs(scratch.sleeve(&["sleeve", "learn", "--out", "prior.json"]).args(sessions));
+    scratch.worn("today.csv", worn(7), |_| ());
+    scratch.worn("again.csv", worn(7), |row| row[0] += 1.0);
+    let from = ["calibrate", "--prior", "prior.json", "--out", "prior_made.json", "today.csv"];
+    runs(&mut scratch.sleeve(&from));
+    let columns = ["calibrate", "--reference", "angle_deg", "--signal", "s1", "--out", "own.json"];
+    runs(scratch.sleeve(&columns).arg("today.csv"));
+    for (record, usual) in [
+        ("own.json", " deg is usual in this calibration. If the sensor was put on again"),
+        (
+            "prior_made.json",
+            " deg is usual (in 4 earlier sessions; without a shift, one session in 5 at most exceeds it). If the sensor",
+        ),
+    ] {
+        let said = scratch.error(record, "again.csv").1;
+        assert!(said.contains(" s, across a pause: at most ") && said.contains(usual), "{said}");
+        let said = scratch.error(record, "today.csv").1;
+        assert!(!said.contains("the zero has shifted"), "{said}");
+    }
+}
+
+#[test]
 fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
     let scratch = Scratch::new();
     let worn = Worn { seconds: 80.0, ..SHORT };

@@ -97,7 +97,8 @@ pub(crate) fn zero_move(signals: &[&[f64]], sign: f64, rate: SampleRate) -> Opti
 fn zero_span(levels: &[f64], turns: &Turns) -> Option<f64> {
     let medians = levels.windows(Turns::MEDIAN_OF).filter_map(|own| median(own.to_vec()));
     let range = extent(medians.chain([turns.level]));
-    (levels.len() >= Turns::MEDIAN_OF).then(|| (range.max - range.min) / turns.scatter)
+    let span = (range.max - range.min) / turns.scatter;
+    (levels.len() >= Turns::MEDIAN_OF && span > 0.0).then_some(span)
 }
 
 /// Returns the turning points with the limit of a prior: the largest of the changes of the zero in its sessions
@@ -128,8 +129,10 @@ fn learn(signals: &[&[f64]], sign: f64, rate: SampleRate) -> Option<(Turns, [f64
         movements.push(own);
     }
     let (learnt, ends) = measure_levels(&movements)?;
-    // If every stretch has a single movement, the time between movements is unknown.
-    let pause_s = median(periods).map_or(LEAST_PAUSE_S, |s| LEAST_PAUSE_S.max(LEAST_PAUSE * s));
+    // If every stretch has a single movement, a movement takes at most the mean length of a stretch.
+    let samples: usize = signals.iter().map(|signal| signal.len()).sum();
+    let mean_s = samples as f64 * rate.period_s() / f64::from(learnt.movements);
+    let pause_s = LEAST_PAUSE_S.max(LEAST_PAUSE * median(periods).unwrap_or(mean_s));
     Some((Turns { least_span: finder.least_span, pause_s, ..learnt }, ends))
 }
 

@@ -45,6 +45,7 @@ impl Prior {
             && prior.known.iter().all(is_known)
             && prior.known.first().is_some_and(|root| root.path.is_empty())
             && prior.noise > 0.0
+            && prior.zero_moves.iter().all(|x| x.is_finite() && *x > 0.0)
             && prior.levels.iter().chain([&prior.gram]).all(is_whole);
         match is_good {
             true => Ok(prior),

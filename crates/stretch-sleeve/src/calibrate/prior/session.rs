@@ -237,7 +237,7 @@ impl Session {
             && self.still_samples.len() == self.signals.len()
             && self.domains.iter().all(has_domain)
             && self.parts.iter().all(is_whole)
-            && self.zero_move.is_none_or(|x| x.is_finite() && x >= 0.0);
+            && self.zero_move.is_none_or(|x| x.is_finite() && x > 0.0);
         if is_good { Ok(()) } else { Err(problem("its numbers contradict each other")) }
     }
 }

@@ -87,6 +87,9 @@ impl Prior {
     /// triangle `R` by Householder reflections. The posterior is `N(R^-1 q, s^2 (R'R)^-1)`, where `q` are the reduced
     /// values. A sample has weight 1/`n`, where `n` is the number of samples within which errors are correlated.
     ///
+    /// For a single gauge, the limit for a shift of the zero comes from the sessions of the prior if at least three of them
+    /// have enough movements ([`Turns`](crate::Turns)).
+    ///
     /// # Errors
     /// [`SleeveError::Prior`] if the data have other channels, another unit, another rate or another polarity than the
     /// prior. The error states what to do.

@@ -53,7 +53,7 @@ const RECORD: &str = "
 | `signal_range`, `target_range` | smallest and largest value in the fitted trials; signal and target are divided by these ranges |
 | `rate_estimator` | window and degree of the Savitzky-Golay filter that gives the rate |
 | `rate_source` | whether the fit used the rate of the signal or, as published, the rate of the reference |
-| `turns` | levels of the turning points of movements in the fitted trials, and limits for the levels of later movements; absent if there were too few movements |
+| `turns` | levels of the turning points of movements in the fitted trials, and the limit for their change across a pause; absent if there were too few movements |
 | `dead_band` | rate below which the direction of motion is not changed, in units of the signal per second |
 | `model` | name of the model, with its coefficients, time constants and domains |
 | `provenance` | date of the calibration; number, names and checksums of the fitted trials |

@@ -204,3 +204,24 @@ fn a_reference_that_is_off_throughout_is_remarked_on_with_what_to_do() {
     }
     assert!(!told(&other("same.csv", |mm| mm)).contains("on average"));
 }
+
+#[test]
+fn a_row_without_numbers_costs_a_row_and_no_signal() {
+    let scratch = Scratch::new();
+    let text = std::fs::read_to_string(scratch.loops("whole.csv", 20.0, 1.1)).unwrap();
+    let mut lines: Vec<&str> = text.lines().collect();
+    lines[500] = "4.99,NaN,NaN";
+    let log = scratch.write("hole.csv", lines.join("\n"));
+    for signal in ["auto", "all"] {
+        let told = runs(calibrate(&log, &scratch.path("cal.json")).args(["--signal", signal]));
+        assert!(told.contains("is off by"), "{signal}: {told}");
+    }
+    let rows = (0..2000).map(|n| format!("{:.2},{},word\n", 0.01 * f64::from(n), n % 90));
+    let log =
+        scratch.write("words.csv", format!("time_s,length_mm,state\n{}", rows.collect::<String>()));
+    for signal in ["auto", "all"] {
+        let mut command = calibrate(&log, &scratch.path("cal.json"));
+        let says = ["words.csv: no column of numbers is left for a signal", "time and length_mm"];
+        fails(command.args(["--signal", signal]), &says);
+    }
+}

@@ -276,6 +276,11 @@ impl Args {
         }
     }
 
+    /// Returns the paths of the calibration file and the report.
+    fn written(&self) -> impl Iterator<Item = &Path> {
+        std::iter::once(&self.out).chain(&self.report).map(PathBuf::as_path)
+    }
+
     /// Reads the trials. The flag tells whether they are tables without a time, to which only a
     /// line or a curve can be fitted.
     fn read(&self, columns: &mut ReadOptions) -> anyhow::Result<(Vec<Trial>, bool)> {
@@ -398,17 +403,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let named = if is_table { &[][..] } else { &named[..] };
     let (trials, gross_errors) = without_gross_errors(trials, named);
     let named = |error: CalibrateError| of_files(error, &args.trials);
-    let ranking = match signal {
-        Signal::Best(names) => {
-            let all = || other_columns(&trials, std::slice::from_ref(&args.reference));
-            let names = if names.is_empty() { all()? } else { names };
-            rank_signals(&trials, &names, &options).map_err(named)?
-        }
-        _ => Vec::new(),
-    };
+    let ranking = rank(&trials, &signal, &args, &options)?;
     if let Some(best) = ranking.first() {
         options.signal.clone_from(&best.signal);
-        detail(format!("chose the signal {} from {} candidates", best.signal, ranking.len()));
     }
     let causes = match is_table {
         true => Causes::default(),
@@ -429,16 +426,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     calibrated
         .notes
         .splice(0..0, gross_errors.into_iter().chain(copied_signals(&trials, &candidates)));
-    match explains_nothing(&calibrated.fits) {
-        Some(why) if args.force => {
-            calibrated.notes.push(format!("{why}; written because of --force"))
-        }
-        Some(why) => {
-            let refusal = anyhow!("nothing is written: {why}; give --force to write it anyway");
-            return Err(of_files(refusal, &args.trials));
-        }
-        None => calibrated.notes.extend(explains_little(&calibrated.fits)),
-    }
+    accept(&mut calibrated, &args)?;
     calibrated.notes.extend(causes.notes);
     calibrated.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
     let mut outputs = Outputs::default();
@@ -469,18 +457,52 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         "notes": calibrated.notes,
     });
     args.json.conclude(outputs, &answer, || {
-        let mut blocks = Vec::new();
-        match &choice {
-            Some(choice) => {
-                say_first(format!("Chosen: {}.", choice.why))?;
-                blocks.extend((!test.is_empty()).then_some(judged));
-                blocks.extend(blocks_of_models(choice, &options.reference));
-            }
-            None => say_first(judged)?,
-        }
-        blocks.extend(blocks_of_calibration(&calibrated, &ranking, choice.is_some()));
-        say_below(blocks, std::iter::once(&args.out).chain(&args.report).map(PathBuf::as_path))
+        let Some(choice) = &choice else {
+            say_first(judged)?;
+            return say_below(blocks_of_calibration(&calibrated, &ranking, false), args.written());
+        };
+        say_first(format!("Chosen: {}.", choice.why))?;
+        let tested = (!test.is_empty()).then_some(judged);
+        let models = blocks_of_models(choice, &options.reference);
+        let others = blocks_of_calibration(&calibrated, &ranking, true);
+        say_below(tested.into_iter().chain(models).chain(others), args.written())
     })
+}
+
+/// Ranks the signals of `--signal auto`, and returns none for any other signal.
+fn rank(
+    trials: &[Trial],
+    signal: &Signal,
+    args: &Args,
+    options: &Options,
+) -> anyhow::Result<Vec<Candidate>> {
+    let Signal::Best(names) = signal else { return Ok(Vec::new()) };
+    let names = match &names[..] {
+        [] => other_columns(trials, std::slice::from_ref(&args.reference))?,
+        names => names.to_vec(),
+    };
+    let ranking = rank_signals(trials, &names, options);
+    let ranking = ranking.map_err(|error| of_files(error, &args.trials))?;
+    if let Some(best) = ranking.first() {
+        detail(format!("chose the signal {} from {} candidates", best.signal, ranking.len()));
+    }
+    Ok(ranking)
+}
+
+/// Accepts a fit that explains something, with a note if that is little. With `--force`, accepts any
+/// fit.
+fn accept(calibrated: &mut Calibrated, args: &Args) -> anyhow::Result<()> {
+    match explains_nothing(&calibrated.fits) {
+        Some(why) if args.force => {
+            calibrated.notes.push(format!("{why}; written because of --force"))
+        }
+        Some(why) => {
+            let refusal = anyhow!("nothing is written: {why}; give --force to write it anyway");
+            return Err(of_files(refusal, &args.trials));
+        }
+        None => calibrated.notes.extend(explains_little(&calibrated.fits)),
+    }
+    Ok(())
 }
 
 /// Chooses a model, and shows on a terminal how many have been judged.

@@ -103,13 +103,15 @@ impl Reach {
 
 impl Reach {
     /// Returns the power of ten that brings most samples inside, with their number. If several powers do so, because the
-    /// range contains zero, it is the one that makes the samples about as wide as the range; `None` if there is none.
+    /// range contains zero, it is the one that makes the samples about as wide as the range and belongs to a unit; `None`
+    /// if there is none.
     fn best_power(&self) -> Option<(i32, u64)> {
         let brings = POWERS.zip(self.inside).filter(|(_, inside)| 2 * inside > self.samples);
         let brings: Vec<(i32, u64)> = brings.collect();
         let is_as_wide = |(power, _): &&(i32, u64)| {
             let share = (self.seen.max - self.seen.min) * ten_to(*power) / self.range.span();
-            (share.log10() * 2.0).abs() <= 1.0
+            let is_unit = power % 3 == 0 || in_other_unit(&self.unit, *power).is_some();
+            is_unit && (share.log10() * 2.0).abs() <= 1.0
         };
         match &brings[..] {
             [one] => Some(*one),
@@ -163,6 +165,8 @@ pub(crate) fn four_digits(x: f64) -> String {
 
 #[cfg(test)]
 mod tests {
+    use stretch_core::{Normalisation, RangeSpec};
+
     use super::*;
 
     #[test]
@@ -205,11 +209,8 @@ mod tests {
     /// Every large divisor brings samples into a range that contains zero.
     #[test]
     fn a_unit_is_guessed_only_if_it_makes_the_samples_as_wide_as_the_range() {
-        let mut spec = stretch_receptor::example_calibration().into_spec();
-        let mode = stretch_core::Normalisation::MinMax;
-        let wide = stretch_core::RangeSpec { mode, zero: 0.0, min: -0.1, max: 1.0 };
-        spec.signal_range = stretch_core::Range::new(wide).unwrap();
-        let range = spec.signal_range;
+        let mode = Normalisation::Range;
+        let range = Range::new(RangeSpec { mode, zero: 0.0, min: -0.1, max: 1.0 }).unwrap();
         let inside = [0; COUNT];
         let told = |factor: f64| {
             let mut reach = Reach {
@@ -224,7 +225,8 @@ mod tests {
             reach.doubt().map(|doubt| doubt.text).unwrap_or_default()
         };
         assert!(told(1000.0).contains("are they in mV?"), "{}", told(1000.0));
-        assert!(told(20.0).contains("when divided by 10"), "{}", told(20.0));
+        // Another sensor with five times the signal.
+        assert!(told(5.0).contains("is it the calibrated sensor"), "{}", told(5.0));
     }
 
     #[test]

@@ -105,8 +105,8 @@ impl fmt::Display for DesignError {
                 )
             }
             Self::OtherRecord => f.write_str(
-                "the seal of the record is valid, but the record holds another type: load the type that was stored, with its window and \
-                 degree (stretch export --fixed prints the type), or store the calibration again",
+                "the seal is valid, but the bytes hold another type, or one of an earlier release: load the type that was stored, with its \
+                 window and degree (stretch export --fixed prints the type), or calibrate again",
             ),
             Self::Schema { found: 3, .. } => write!(
                 f,

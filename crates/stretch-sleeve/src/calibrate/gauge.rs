@@ -5,7 +5,7 @@ use stretch_core::{Design, RateEstimator};
 use stretch_data::Trial;
 use stretch_receptor::{Reading, Withheld};
 
-use crate::{GaugeCalibration, TurnFinder, Zero, ZeroMemory, ZeroWatch};
+use crate::{GaugeCalibration, Zero, ZeroMemory, ZeroWatch};
 
 use super::turns::follows_rest;
 
@@ -99,36 +99,6 @@ impl LiveGauge {
         self.receptor.faults()
     }
 }
-
-/// Returns a note for a calibration without the turning points of movements, with the number of movements in its trials;
-/// `None` if the calibration has turning points or needs only the signal, as that of a load cell.
-///
-/// A movement goes down and up again by at least a third of the range without the lowest and highest 5 % of the samples.
-pub fn missing_turns(gauge: &GaugeCalibration, trials: &[Trial]) -> Option<String> {
-    let spec = gauge.calibration().spec();
-    if gauge.turns().is_some() || spec.model.needs_signal_only() {
-        return None;
-    }
-    let signals = || trials.iter().filter_map(|trial| trial.channel(spec.signal.as_str()));
-    let mut all: Vec<f64> = signals().flatten().copied().filter(|v| v.is_finite()).collect();
-    all.sort_by(f64::total_cmp);
-    let at = |share: usize| all.get(all.len() * share / 20).copied();
-    let finder = TurnFinder::new((at(19)? - at(1)?) / 3.0);
-    let movements = signals().map(|signal| {
-        let mut memory = finder.memory();
-        let finite = signal.iter().filter(|v| v.is_finite());
-        finite.filter_map(|v| finder.step(&mut memory, spec.polarity.sign() * v)).count()
-    });
-    Some(format!(
-        "the calibration lacks the levels at which movements reverse, so that stretch apply cannot detect that the gauge was put on again: \
-         {} movements were found, and at least {LEAST} are needed whose levels do not follow those before them (as they do in a drift) and \
-         that are larger than the noise; record a minute or more of movements over the whole range",
-        movements.sum::<usize>()
-    ))
-}
-
-/// Smallest number of independent movements for turning points, as in [`find_turns`](crate::find_turns).
-const LEAST: usize = 8;
 
 /// The readings of a trial, and the deviations of the gauge's zero that the movements show.
 #[derive(Debug, Clone)]

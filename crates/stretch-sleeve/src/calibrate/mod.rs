@@ -16,7 +16,7 @@ mod turns;
 
 pub use array::{AppliedArray, ArrayFit, ArrayOptions, Carried, apply_array, calibrate_array};
 pub use error::SleeveError;
-pub use gauge::{AppliedGauge, LiveGauge, apply_gauge, missing_turns};
+pub use gauge::{AppliedGauge, LiveGauge, apply_gauge};
 pub use prior::{
     Assumed, ErrorSpread, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session,
     SessionOptions, UpdateOptions, UpdateSummary, Updated,
@@ -24,4 +24,4 @@ pub use prior::{
 pub use record::{
     RecordSummary, SleeveCalibration, array_bytes, array_seal, describe_record, seal_record,
 };
-pub use turns::{calibrate_gauge, find_turns};
+pub use turns::{calibrate_gauge, find_turns, missing_turns};

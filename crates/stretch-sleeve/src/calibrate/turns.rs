@@ -68,6 +68,39 @@ pub fn find_turns(calibration: &Calibration, signals: &[&[f64]]) -> Option<Turns
     Some(turns).filter(|turns| turns.validate().is_ok())
 }
 
+/// Returns a note for a calibration without the turning points of movements, with the number of movements in its trials;
+/// `None` if the calibration has turning points or needs only the signal, as that of a load cell.
+pub fn missing_turns(gauge: &GaugeCalibration, trials: &[Trial]) -> Option<String> {
+    let spec = gauge.calibration().spec();
+    if gauge.turns().is_some() || spec.model.needs_signal_only() {
+        return None;
+    }
+    let signals = trials.iter().filter_map(|trial| trial.channel(spec.signal.as_str()));
+    let finite = |signal: &[f64]| signal.iter().copied().filter(|v| v.is_finite()).collect();
+    let signals: Vec<Vec<f64>> = signals.map(finite).collect();
+    let signals: Vec<&[f64]> = signals.iter().map(Vec::as_slice).collect();
+    let finder = TurnFinder::new(LEAST_SPAN * middle_span(&signals)?);
+    let ends = |signal: &&[f64]| moves(finder, signal, spec.polarity.sign()).count();
+    Some(format!(
+        "the calibration lacks the levels at which movements reverse, so that stretch apply cannot detect that the gauge was put on again: \
+         {} movements were found, and at least {LEAST_MOVEMENTS} are needed whose levels do not follow those before them (as they do in a drift) and \
+         that are larger than the noise; record a minute or more of movements over the whole range",
+        signals.iter().map(ends).sum::<usize>()
+    ))
+}
+
+/// Returns the movements of a signal, which is multiplied by `sign`: the index of the sample at which each ends, and its
+/// low and high end.
+fn moves(
+    finder: TurnFinder<f64>,
+    signal: &[f64],
+    sign: f64,
+) -> impl Iterator<Item = (usize, (f64, f64))> {
+    let mut memory = finder.memory();
+    let ends = signal.iter().map(move |v| finder.step(&mut memory, sign * v));
+    ends.enumerate().filter_map(|(at, ends)| Some((at, ends?)))
+}
+
 /// Returns the largest change of the zero within a session in which the sensor was not put on again, in standard
 /// deviations of levels. The first half of the session is used as a calibration. The change is the largest difference in
 /// the second half between two medians of five consecutive levels, or between one of them and the calibration's level.
@@ -121,10 +154,7 @@ fn learn(signals: &[&[f64]], sign: f64, rate: SampleRate) -> Option<(Turns, [f64
     }
     let (mut movements, mut periods) = (Vec::new(), Vec::new());
     for signal in signals {
-        let mut memory = finder.memory();
-        let ends = signal.iter().map(|v| finder.step(&mut memory, sign * v)).enumerate();
-        let (at, own): (Vec<usize>, Vec<(f64, f64)>) =
-            ends.filter_map(|(at, ends)| Some((at, ends?))).unzip();
+        let (at, own): (Vec<usize>, Vec<(f64, f64)>) = moves(finder, signal, sign).unzip();
         periods.extend(at.windows(2).map(|pair| (pair[1] - pair[0]) as f64 * rate.period_s()));
         movements.push(own);
     }

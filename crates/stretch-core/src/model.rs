@@ -111,6 +111,27 @@ impl Model {
         }
     }
 
+    /// Returns the root mean square error of the fit in normalised target, the larger one of two branches; infinite for
+    /// a removed kind.
+    ///
+    /// ```
+    /// use stretch_core::{FitSummary, Interval, LinearMap, Model};
+    /// let signal_domain = Interval { min: 1.0, max: 4.0 };
+    /// let fit = FitSummary { samples: 100, r_squared: 0.9, rmse: 0.1 };
+    /// let line = LinearMap { slope: 1.0, intercept: 0.0, signal_domain, fit };
+    /// assert_eq!(Model::Linear(line).fit_rmse(), 0.1);
+    /// ```
+    pub fn fit_rmse(&self) -> f64 {
+        match self {
+            Self::Linear(line) => line.fit.rmse,
+            Self::Surfaces { inflation, deflation } => inflation.fit.rmse.max(deflation.fit.rmse),
+            Self::Blended { .. } => f64::INFINITY,
+            Self::History(map) => map.fit.rmse,
+            Self::Observer(map) => map.fit.rmse,
+            Self::Diagnosed(map) => map.fit.rmse,
+        }
+    }
+
     /// Returns the error of a caller that accepts only models of kind `expected`: [`DesignError::Mismatch`] with
     /// this model's name.
     pub fn instead_of(&self, expected: &'static str) -> DesignError {

@@ -81,16 +81,24 @@ const FAR_OFF_PERCENT: f64 = 5.0;
 const LEAST_GAIN: f64 = 0.2;
 
 /// Returns a sentence for estimates that are shifted: without their mean error, the RMSE would be smaller by at least a
-/// fifth, and the mean error is more than a twentieth of the range.
+/// fifth, and the mean error is more than a twentieth of the range and more than the RMSE of the calibration's fit. A
+/// model that does not describe the sensor has a mean error below that RMSE in most trials, although nothing has shifted.
 ///
 /// ```text
-/// sqrt(rmse^2 - bias^2) <= 0.8 rmse
+/// sqrt(rmse^2 - bias^2) <= 0.8 rmse,  |bias| > rmse of the fit
 /// ```
 ///
 /// Typical causes are a sensor that was put on again, and a reference in centimetres with a calibration in millimetres.
-pub(super) fn off_throughout(errors: &MethodErrors, unit: &str) -> Option<String> {
+pub(super) fn off_throughout(
+    errors: &MethodErrors,
+    calibration: &Calibration,
+    unit: &str,
+) -> Option<String> {
     let MethodErrors { bias, rmse, rmse_percent, .. } = *errors;
-    let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
+    let spec = calibration.spec();
+    let reference_per_rmse = spec.target_range.span() * spec.target.reference_per_target().abs();
+    let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse
+        && bias.abs() > spec.model.fit_rmse() * reference_per_rmse;
     let unshifted = (rmse * rmse - bias * bias).max(0.0).sqrt();
     (is_far && unshifted <= (1.0 - LEAST_GAIN) * rmse).then(|| {
         let with_unit = |x: f64| format!("{} {unit}", four_digits(x)).trim_end().to_owned();

@@ -152,7 +152,7 @@ pub fn evaluation_doubts(
         let signals = trials.iter().filter_map(|trial| trial.channel(signal));
         signals.flatten().for_each(|value| reach.take(*value));
         let words = [
-            ("constant_error", off_throughout(errors, &evaluation.unit)),
+            ("constant_error", off_throughout(errors, calibration, &evaluation.unit)),
             ("worse_than_the_mean", worse_than_the_mean(errors)),
             ("constant_reference", beside_a_constant(errors)),
         ];

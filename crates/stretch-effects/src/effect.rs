@@ -47,7 +47,7 @@ pub enum Acts {
         /// Computes the kind's values; `None` if they equal the effect's values.
         values: Option<Values>,
     },
-    /// As an action of its own that belongs to no kind.
+    /// As a separate action that belongs to no kind.
     Own {
         /// Place and operation of the effect, for values that do not turn it off.
         action: fn(&[f64], &Surroundings<'_>) -> Action,

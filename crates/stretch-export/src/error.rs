@@ -21,7 +21,7 @@ pub enum ExportError {
     /// An integer form was requested, but this model has none.
     #[error("{0}; or export in --form float, which takes the signal instead of a code")]
     NoFixedForm(#[source] CalibrateError),
-    /// The codes of the converter stand for a signal outside the calibrated range.
+    /// The codes of the converter represent a signal outside the calibrated range.
     #[error(transparent)]
     Converter(CalibrateError),
     /// Integers were requested for several gauges.

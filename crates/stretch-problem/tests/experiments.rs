@@ -67,7 +67,7 @@ fn every_experiment_is_replayed_from_its_columns() {
         let predicted = rig.predict(&nominal, &setting).unwrap();
         for (column, values) in ["length_mm", "bridge_v"].into_iter().zip(&predicted) {
             // If the candidate gives the pressure a separate course, the replayed vented muscle has
-            // the voltage of its own pressure.
+            // the voltage from its pressure.
             let noise = if column == "length_mm" { 0.05 } else { 0.002 };
             let shown = trial.channel(column).unwrap();
             let worst = shown.iter().zip(values).map(|(a, b)| (a / noise - b).abs());

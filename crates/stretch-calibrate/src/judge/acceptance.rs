@@ -77,30 +77,32 @@ pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
 /// Smallest constant error that is reported, in percent of the range of the reference.
 const FAR_OFF_PERCENT: f64 = 5.0;
 
-/// Least share of the RMSE that vanishes with the mean error, for a mean error that is reported.
-const LEAST_GAIN: f64 = 0.2;
+/// Largest ratio of the RMSE without the mean error to the RMSE of the fit at which the calibration
+/// still holds apart from a shift.
+const ALIKE: f64 = 1.25;
 
-/// Returns a sentence for estimates that are shifted: without their mean error, the RMSE would be smaller by at least a
-/// fifth, and the mean error is more than a twentieth of the range and more than the RMSE of the calibration's fit. A
-/// model that does not describe the sensor has a mean error below that RMSE in most trials, although nothing has shifted.
+/// Returns a sentence for estimates that are shifted: the mean error is more than a twentieth of the range, and either it
+/// is most of the error, or the calibration is as accurate without it as in its fit.
 ///
 /// ```text
-/// sqrt(rmse^2 - bias^2) <= 0.8 rmse,  |bias| > rmse of the fit
+/// bias^2 >= rmse^2 / 2,  or  sqrt(rmse^2 - bias^2) <= 1.25 fit < rmse
 /// ```
 ///
-/// Typical causes are a sensor that was put on again, and a reference in centimetres with a calibration in millimetres.
+/// Here `fit` is the RMSE of the fit. Typical causes are a sensor that was put on again, and a reference in centimetres
+/// with a calibration in millimetres.
 pub(super) fn off_throughout(
     errors: &MethodErrors,
     calibration: &Calibration,
     unit: &str,
 ) -> Option<String> {
     let MethodErrors { bias, rmse, rmse_percent, .. } = *errors;
+    let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
+    let unshifted = (rmse * rmse - bias * bias).max(0.0).sqrt();
     let spec = calibration.spec();
     let reference_per_rmse = spec.target_range.span() * spec.target.reference_per_target().abs();
-    let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse
-        && bias.abs() > spec.model.fit_rmse() * reference_per_rmse;
-    let unshifted = (rmse * rmse - bias * bias).max(0.0).sqrt();
-    (is_far && unshifted <= (1.0 - LEAST_GAIN) * rmse).then(|| {
+    let alike = ALIKE * spec.model.fit_rmse() * reference_per_rmse;
+    let is_shift = unshifted <= bias.abs() || (unshifted <= alike && alike < rmse);
+    (is_far && is_shift).then(|| {
         let with_unit = |x: f64| format!("{} {unit}", four_digits(x)).trim_end().to_owned();
         let side = if bias > 0.0 { "above" } else { "below" };
         format!(

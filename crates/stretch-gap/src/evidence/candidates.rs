@@ -155,7 +155,7 @@ pub(crate) const LEAST_CLOSED: f64 = 0.3;
 /// posterior's sets. A set of effects that closes less than [`LEAST_CLOSED`] of the gap is dropped.
 /// If every remaining set leaves more than noise and model discrepancy would, `function` is called
 /// with the set of the highest score. It computes one more hypothesis: a function of the recorded
-/// signals, which stands for a cause outside the catalogue.
+/// signals, which represents a cause outside the catalogue.
 pub(crate) fn posterior(
     problem: &PreparedProblem<'_>,
     thresholds: &Thresholds,

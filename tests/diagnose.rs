@@ -296,7 +296,8 @@ fn a_wrong_rig_is_no_effect_and_a_strong_effect_is_no_wrong_rig() {
         let text = runs(diagnose(&folder).arg("--rig").arg(&other));
         let first = text.lines().next().unwrap();
         // The message names the rig in general, or the wrong value.
-        let told = first.contains("right rig") || first.contains("rig file");
+        let words = ["right rig", "rig file", "does not fit the rig"];
+        let told = words.iter().any(|words| first.contains(words));
         assert!(told && !first.contains("lacks"), "{name}: {text}");
     }
     for effect in ["pressure_crosstalk:c=0.04", "crossbeam_inertia:m=0.07"] {

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use stretch_core::{DesignError, RateEstimator, SampleRate};
+use stretch_core::DesignError;
 use stretch_filter::FilterError;
 
 /// The reason why no receptor can be created from a calibration.
@@ -15,13 +15,9 @@ pub enum ReceptorError {
     /// The rate estimator that the calibration names needs later samples, which a live stream does
     /// not have.
     LooksAhead,
-    /// The rate estimator is not the one with which the calibration was fitted.
-    Rate {
-        /// The estimator of the calibration and its sample rate.
-        fitted: (RateEstimator, SampleRate),
-        /// The estimator that was given and its sample rate.
-        given: (RateEstimator, SampleRate),
-    },
+    /// The rate estimator or its sample rate is not the one with which the calibration was fitted. The
+    /// variant has no numbers, because their formatting would cost a board some kilobytes.
+    Rate,
 }
 
 impl From<DesignError> for ReceptorError {
@@ -47,12 +43,9 @@ impl fmt::Display for ReceptorError {
             Self::LooksAhead => f.write_str(
                 "the rate estimator looks ahead: it works on a log, not live; choose a Savitzky-Golay, a differentiator or a tracker",
             ),
-            Self::Rate { fitted: (fitted, fitted_at), given: (given, given_at) } => write!(
-                f,
-                "the rate estimator is {given:?} at {} Hz, but the calibration was fitted with {fitted:?} at {} Hz: design the rate \
-                 estimator with the window, the degree and the sample rate of the calibration",
-                given_at.hz(),
-                fitted_at.hz()
+            Self::Rate => f.write_str(
+                "the rate estimator is not the one with which the calibration was fitted: design it with the window, the degree and the \
+                 sample rate of the calibration",
             ),
         }
     }
@@ -62,7 +55,7 @@ impl core::error::Error for ReceptorError {
     fn source(&self) -> Option<&(dyn core::error::Error + 'static)> {
         match self {
             Self::Calibration(error) => Some(error),
-            Self::LooksAhead | Self::Rate { .. } => None,
+            Self::LooksAhead | Self::Rate => None,
         }
     }
 }

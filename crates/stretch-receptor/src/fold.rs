@@ -32,7 +32,7 @@ pub(crate) fn check_rate(
 ) -> Result<(), ReceptorError> {
     let fitted = (calibration.spec().rate_estimator, calibration.spec().sample_rate_hz);
     match rate.named() {
-        Some(given) if given != fitted => Err(ReceptorError::Rate { fitted, given }),
+        Some(given) if given != fitted => Err(ReceptorError::Rate),
         _ => Ok(()),
     }
 }

@@ -254,29 +254,14 @@ fn the_memory_of_a_channel_is_as_documented() {
 fn a_rate_estimator_that_the_calibration_does_not_name_is_refused() {
     let calibration = example_calibration();
     let (hz, other) = (calibration.spec().sample_rate_hz, SampleRate::new(50.0).unwrap());
-    let refused = |error: Option<ReceptorError>, parts: [&str; 2]| {
-        let error = error.expect("refused");
-        let text = error.to_string();
-        assert!(matches!(error, ReceptorError::Rate { .. }), "{text}");
-        assert!(parts.iter().all(|part| text.contains(part)), "{text}");
-    };
+    let refused = |error: Option<ReceptorError>| assert_eq!(error, Some(ReceptorError::Rate));
     let short = SgRate::<f32, 9, 2>::new(hz).unwrap();
-    refused(
-        StretchReceptor::<f32, _>::with_rate(&calibration, short).err(),
-        ["window: 9", "window: 11"],
-    );
+    refused(StretchReceptor::<f32, _>::with_rate(&calibration, short).err());
     let degree = IntegerSgRate::<11, 1>::new(hz, 3.3).unwrap();
-    refused(
-        StretchReceptor::<f32, _>::with_rate(&calibration, degree).err(),
-        ["degree: 1", "degree: 2"],
-    );
+    refused(StretchReceptor::<f32, _>::with_rate(&calibration, degree).err());
     let slow = SgRate::<f32, 11, 2>::new(other).unwrap();
-    refused(
-        StretchReceptor::<f32, _>::with_rate(&calibration, slow).err(),
-        ["at 50 Hz", "at 100 Hz"],
-    );
+    refused(StretchReceptor::<f32, _>::with_rate(&calibration, slow).err());
     let tracker = RateFilter::<f64>::new(RateEstimator::Tracker { tracking_index: 0.1 }, hz);
-    let tracker = tracker.unwrap();
-    refused(Receptor::<f64, _>::with_rate(&calibration, tracker).err(), ["Tracker", "window: 11"]);
+    refused(Receptor::<f64, _>::with_rate(&calibration, tracker.unwrap()).err());
     assert!(StretchReceptor::<f64, ()>::with_rate(&calibration, ()).is_ok());
 }

@@ -360,6 +360,6 @@ fn worst(
 
 /// Returns the root mean square of a residual in multiples of the noise, from its excess (reduced
 /// chi-square minus 1).
-fn multiple(excess: f64) -> f64 {
+pub(crate) fn multiple(excess: f64) -> f64 {
     (1.0 + excess).max(0.0).sqrt()
 }

@@ -14,7 +14,10 @@ use crate::{
         simulator::Simulator,
         spec::{EffectSpec, StageSpec, TrialSpec},
     },
-    verdict::{answer::Answer, note::Note},
+    verdict::{
+        answer::{Answer, multiple},
+        note::Note,
+    },
 };
 
 /// Returns notes that complete the answer: that there is no test trial, that most of a channel is
@@ -159,9 +162,8 @@ const WORSE: f64 = 1.2;
 /// Returns a note for each output that the re-tuned parameters predict worse on test trials than
 /// the parameters as shipped.
 pub(crate) fn retuning_notes(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<String> {
-    let times = |excess: f64| (1.0 + excess).max(0.0).sqrt();
     let note = |(spec, traces): (&StageSpec, &StageEvidence)| {
-        let (shipped, retuned) = (times(traces.excess_raw), times(traces.excess_retuned));
+        let (shipped, retuned) = (multiple(traces.excess_raw), multiple(traces.excess_retuned));
         (retuned > WORSE * shipped.max(1.0)).then(|| {
             format!(
                 "the re-tuned parameters predict {} on trials that were not fitted worse than those as shipped ({retuned:.2} against {shipped:.2} \

@@ -56,14 +56,10 @@ impl Diagnosis {
             Some(Answer::Faint { .. }) => {
                 "Check whether the noise is larger than stated. If it is not, something small is missing."
             }
-            Some(Answer::Missing { effects, .. } | Answer::Partly { effects, .. })
-                if effects.iter().any(MissingEffect::is_tied) =>
-            {
+            Some(answer) if answer.effects().iter().any(MissingEffect::is_tied) => {
                 "Run an experiment that tells them apart before you build on one."
             }
-            Some(Answer::Missing { effects, .. } | Answer::Partly { effects, .. })
-                if effects.len() == 1 =>
-            {
+            Some(answer) if answer.effects().len() == 1 => {
                 "Add it to the simulator, then diagnose again."
             }
             Some(Answer::Missing { .. } | Answer::Partly { .. }) => {

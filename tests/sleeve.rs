@@ -327,7 +327,7 @@ fn priors_refuse_what_they_have_not_seen() {
         command.args(more);
         command
     };
-    fails(&mut with(&["--signal", "s1", "plain.csv"]), &["2 channels", "1 were named", "--signal"]);
+    fails(&mut with(&["--signal", "s1", "plain.csv"]), &["2 channels", "1 were given", "--signal"]);
     let radian = scratch.path("radian.csv");
     let text = std::fs::read_to_string(scratch.path("plain.csv")).unwrap();
     std::fs::write(&radian, text.replace("angle_deg", "angle_rad")).unwrap();

@@ -189,7 +189,7 @@ pub(crate) fn effects(seeds: &[u64], only: &[&str]) -> anyhow::Result<Vec<Result
 /// Evaluates faults in use that were not present at calibration.
 pub(crate) fn robustness(seeds: &[u64]) -> anyhow::Result<Vec<ResultTable>> {
     let header = [
-        "fault at use",
+        "fault during use",
         "published mm",
         "poly13 mm",
         "history mm",
@@ -198,7 +198,7 @@ pub(crate) fn robustness(seeds: &[u64]) -> anyhow::Result<Vec<ResultTable>> {
         "observer of published",
         "observer+rest of published",
     ];
-    let title = "Faults at use only (preset paper; five seeds; arbitrary tests)";
+    let title = "Faults during use only (preset paper; five seeds; arbitrary tests)";
     let mut table = ResultTable::new("robustness.csv", title, &header);
     let sessions = sessions(seeds)?;
     let faults = [

@@ -143,7 +143,8 @@ enum Native {
     Three(Arc<FMU3>),
 }
 
-/// An instance. It is freed on drop, unless it may not be called any more.
+/// An instance. It is freed on drop, except after a fatal error, because FMI forbids any further
+/// call then.
 pub(crate) struct Instance {
     native: Option<Native>,
     said: Arc<Said>,

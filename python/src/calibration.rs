@@ -110,7 +110,7 @@ struct Made<'a> {
     notes: &'a [String],
 }
 
-/// Fits a calibration; the answer is the calibration, and fits, models and notes as JSON.
+/// Fits a calibration. Returns it, and the fits, the compared models and notes as JSON.
 #[pyfunction]
 pub(crate) fn calibrate(
     py: Python<'_>,
@@ -142,7 +142,7 @@ pub(crate) fn calibrate(
     Ok((CalibrationRecord { gauge }, made.map_err(said)?))
 }
 
-/// Evaluates calibrations and the raw signal; the answer is JSON, and the codes and sentences of doubts.
+/// Evaluates calibrations and the raw signal. Returns the result as JSON, and the code and sentence of each doubt.
 #[pyfunction]
 pub(crate) fn evaluate(
     py: Python<'_>,
@@ -175,13 +175,13 @@ impl CalibrationRecord {
         Ok(Self { gauge: GaugeCalibration::from_json(text, "the text").map_err(said)? })
     }
 
-    /// Reads a file: postcard where its name ends in `.postcard`, else JSON.
+    /// Reads a file in postcard format if its name ends in `.postcard`, and in JSON otherwise.
     #[staticmethod]
     fn load(path: PathBuf) -> PyResult<Self> {
         Ok(Self { gauge: GaugeCalibration::read(&path).map_err(said)? })
     }
 
-    /// Writes a file, whole or not at all.
+    /// Writes a file completely, or not at all if an error occurs.
     fn save(&self, path: PathBuf) -> PyResult<()> {
         self.gauge.write(&path).map_err(said)
     }
@@ -238,7 +238,7 @@ impl CalibrationRecord {
         LiveReceptor::new(self.calibration()).map(|live| Receptor { live }).map_err(said)
     }
 
-    /// Estimates of a whole recording, as the receptor gives them live: NaN where a sample has no estimate.
+    /// Estimates of a whole recording, equal to those of a live receptor, with NaN for samples without an estimate.
     fn apply<'py>(
         &self,
         py: Python<'py>,

@@ -147,9 +147,9 @@ impl Entries {
         Ok(columns)
     }
 
-    /// Diagnoses the problem. The answer holds the diagnosis as JSON, its report, the measured and the simulated curves of each output (as
-    /// shipped, re-tuned, and with the best effects), the code of the named effects, and the columns of the next experiment. Without a
-    /// simulator the workers of the problem's file answer.
+    /// Diagnoses the problem. Returns the diagnosis as JSON, its report, the measured and the simulated curves of each
+    /// output (nominal, re-tuned, and with the best effects), the code of the named effects, and the columns of the
+    /// next experiment. If no simulator is passed, the workers named in the problem's file are run.
     fn diagnose<'py>(
         &self,
         py: Python<'py>,
@@ -179,8 +179,9 @@ impl Entries {
         Ok((json, page, shown, functions, experiment.map(columns).transpose()?, fixed))
     }
 
-    /// Predicts the recordings from number `fitted` on, with the effects of the problem and without: the prediction as JSON, and by output
-    /// what was measured, predicted without and with them, over all of these recordings end to end.
+    /// Predicts the recordings from index `fitted` on, with and without the effects of the problem. Returns the
+    /// prediction as JSON, and for each output three columns over these recordings end to end: measured, predicted
+    /// without the effects, and predicted with them.
     fn predict<'py>(
         &self,
         py: Python<'py>,
@@ -215,7 +216,7 @@ impl Entries {
 
 #[pymethods]
 impl FixedEntries {
-    /// The fixed problem: with the recordings that were fitted and some more, or with others alone.
+    /// Returns the fixed problem with the fitted and further recordings, or with other recordings only.
     fn problem(&self, recordings: Vec<Entry<'_>>, is_alone: bool) -> PyResult<Entries> {
         let mut spec = self.spec.clone();
         if is_alone {
@@ -332,13 +333,13 @@ impl Work<Answer> {
     }
 }
 
-/// A text as a line of comment in Python, whatever names are in it.
+/// Returns a text as a comment line in Python. The text may contain any characters.
 #[pyfunction]
 pub(crate) fn comment(text: &str) -> String {
     Language::Python.comment(text)
 }
 
-/// A name as one that Python takes.
+/// Converts a name to a valid Python identifier.
 #[pyfunction]
 pub(crate) fn identifier(text: &str) -> String {
     Language::identifier(text)

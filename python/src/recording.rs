@@ -80,7 +80,7 @@ fn columns(py: Python<'_>, time_s: Vec<f64>, channels: Vec<Channel>) -> Columns<
     std::iter::once(time).chain(channels).collect()
 }
 
-/// Reads a file that the program reads itself: its columns, and notes.
+/// Reads a file in a format that needs no Python library, and returns its columns and notes.
 #[pyfunction]
 pub(crate) fn read_file<'py>(
     py: Python<'py>,
@@ -93,7 +93,8 @@ pub(crate) fn read_file<'py>(
     Ok((columns(py, trial.time_s, trial.channels), notes))
 }
 
-/// Reads named arrays as those of an NPZ file: their columns on one clock, the columns of each clock, and notes.
+/// Reads named arrays like those of an NPZ file. Returns their columns on one clock, the columns of each clock, and
+/// notes.
 #[pyfunction]
 pub(crate) fn read_arrays<'py>(
     py: Python<'py>,
@@ -118,13 +119,13 @@ pub(crate) fn read_arrays<'py>(
     Ok((columns(py, trial.time_s, trial.channels), clocks, notes))
 }
 
-/// A column's name in the project's way, its unit as the last part.
+/// Converts a column's name to the project's convention, with the unit at its end.
 #[pyfunction]
 pub(crate) fn tidy_column(name: &str) -> String {
     stretch_recording::tidy_column(name)
 }
 
-/// The unit that a column's name says, as it is written; empty where it says none.
+/// Returns the unit in a column's name as it is written, or an empty text if the name has no unit.
 #[pyfunction]
 pub(crate) fn unit_of(column: &str) -> String {
     stretch_data::unit_of(column)

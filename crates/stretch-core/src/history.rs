@@ -102,7 +102,7 @@ pub struct HistoryMap {
     pub rest: Option<RestTracker>,
     /// Time constants, rising, in seconds.
     pub relaxations_s: Values<MAX_RELAXATIONS>,
-    /// Half-widths of the plays, in normalised signal.
+    /// Half-widths of the plays (hysteresis elements), in normalised signal.
     pub radii: Values<MAX_PLAYS>,
     /// The greatest sum of powers, 1 to 5.
     pub degree: u8,

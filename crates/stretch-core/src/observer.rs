@@ -46,7 +46,7 @@ pub struct ObserverMap {
     pub amplitudes: Values<MAX_OBSERVER_RELAXATIONS>,
     /// Seconds by which the signal leads the target; negative if the signal lags.
     pub lead_s: f64,
-    /// Half-widths of the plays, in normalised target.
+    /// Half-widths of the plays (hysteresis elements), in normalised target.
     pub radii: Values<MAX_OBSERVER_PLAYS>,
     /// Weights of the plays. A negative weight gives the usual hysteresis, in which the signal lags.
     pub play_weights: Values<MAX_OBSERVER_PLAYS>,

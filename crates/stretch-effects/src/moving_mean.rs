@@ -25,8 +25,8 @@ use crate::{
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct MovingMean {
-    /// For each grid step that leads to a node: weights of the nodes before that node, the latest first. The node
-    /// itself has the weight 1 minus their sum.
+    /// For each interval of the grid: weights of the nodes before the node at its end, the latest first. The node at
+    /// the end has the weight 1 minus their sum.
     weights: Vec<Vec<f64>>,
     reach: usize,
 }
@@ -45,8 +45,9 @@ impl MovingMean {
 /// Greatest number of nodes that a mean remembers, so that a very long window costs a limited time.
 const MOST_NODES: usize = 100_000;
 
-/// Returns the weights of the nodes before the one to which a piece leads, from the integrals of the lines between
-/// nodes.
+/// Returns the weights of the nodes before the present one, the latest first. `piece` is the index in `steps` of the
+/// interval that ends at the present node. Within each interval the signal is a straight line, which is integrated
+/// exactly.
 fn weights(steps: &[f64], piece: usize, window_s: f64) -> Vec<f64> {
     let (mut found, mut left, mut at, mut whole) = (Vec::new(), window_s, piece, 0.0);
     while left > 0.0 && found.len() < MOST_NODES {

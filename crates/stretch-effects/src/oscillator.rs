@@ -304,7 +304,7 @@ impl Operator for FlexibleJoint {
 pub static FLEXIBLE_JOINT: Kind = Kind {
     name: "flexible_joint",
     title: "a flexible joint",
-    words: "a spring and a damper stand between the motor and the link that is measured",
+    words: "a spring and a damper connect the motor to the link that is measured",
     equation: "m_s^2 y'' = x - y + 2 damping m_s (x' - y')",
     usual: &[Side::Output],
     parameters: |e, _| {

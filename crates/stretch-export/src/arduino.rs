@@ -15,10 +15,10 @@ pub struct File {
 /// the IDE highlights. The example reads pin A0 (for several gauges, A0 and the pins after it) at the calibration's
 /// sample rate.
 ///
-/// The file name of the header is `stretch_` followed by the library's name. It therefore differs from the headers of
-/// other libraries, and libraries of several calibrations can be installed together. A file includes one of them.
-/// Characters that a name may not have become `_`. Copy the folder into the `libraries` folder of the sketchbook.
-/// Source: Arduino library specification, revision 2.2 (format 1.5).
+/// The file name of the header is `stretch_` followed by the library's name. Therefore several such libraries can be
+/// installed at the same time, but a source file can include only one of them. Characters that a name may not have
+/// become `_`. Copy the folder into the `libraries` folder of the sketchbook. Source: Arduino library specification,
+/// revision 2.2 (format 1.5).
 ///
 /// # Errors
 /// [`ExportError::Converter`] if the board's converter measures no part of a calibrated range.

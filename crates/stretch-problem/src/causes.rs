@@ -8,7 +8,7 @@ use stretch_sim::{Catalogue, Gauge};
 
 use crate::{GaugeSetup, GaugeSimulator, in_words};
 
-/// Effects of the gauge that a calibration builds on, and notes on how the effects were found.
+/// Effects of the gauge that a diagnosis found and a calibration corrects, with notes on the diagnosis.
 #[derive(Debug, Clone, Default)]
 pub struct Causes {
     /// The effects of the gauge.

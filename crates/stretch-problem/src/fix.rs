@@ -90,7 +90,7 @@ pub(crate) struct Chosen<'a> {
     /// One standard deviation of every nominal parameter.
     pub(crate) sd: &'a [f64],
     diagnosis: &'a Diagnosis,
-    /// The candidate whose effects are written, if effects are named.
+    /// The candidate whose effects are written; `None` if the diagnosis names no effects.
     found: Option<&'a Candidate>,
 }
 

@@ -94,8 +94,8 @@ fn sensors_that_do_as_they_should_lack_nothing() {
     assert!(found.named.is_empty(), "{:?}: {}", found.named, found.sentence);
 }
 
-/// Each of three sensors could be explained by crosstalk from the others, in a circle. An error
-/// that they share is not named as crosstalk, and a shift by the recorder is still found.
+/// If three sensors have an error in common, crosstalk from the other two could explain each of
+/// them. Such an error is not named as crosstalk, and a shift by the recorder is still found.
 #[test]
 fn an_error_that_all_sensors_share_is_no_crosstalk() {
     for late_s in [0.0, 0.08] {

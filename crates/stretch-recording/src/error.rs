@@ -131,7 +131,8 @@ pub enum RecordingError {
         /// Fields of the header.
         expected: usize,
     },
-    /// A quotation mark that is not closed in its line, or text after it.
+    /// A quotation mark that is not closed in its line, or text between a closing quotation mark
+    /// and the next separator.
     #[error("{at}: the quotation marks do not pair up within the line; remove or double them")]
     Quote {
         /// Where.

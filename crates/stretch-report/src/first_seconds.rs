@@ -168,7 +168,7 @@ fn cheaper(d: &Diagnosis) -> String {
     }
 }
 
-/// Parameters that re-tuning moved by more than a tolerance, as assignments.
+/// Returns the parameters that re-tuning moved by more than a tolerance, as "NAME to VALUE".
 fn moved(d: &Diagnosis) -> Vec<String> {
     let far = d.parameters.iter().filter(|p| p.is_evidence && p.sigmas.abs() > 1.0);
     let fitted = |p: &ParameterShift| with_unit(&number(p.fitted, 3), shown_unit(&p.unit));

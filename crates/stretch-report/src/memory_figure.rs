@@ -82,7 +82,7 @@ pub(crate) fn step_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
         keys: Vec::new(),
         moves: None,
     };
-    Figure::new(&format!("Answer of {name} to a step of the signal"))
+    Figure::new(&format!("Response of {name} to a step of the signal"))
         .draw(FigureSize::NARROW, |area| {
             plot(area, &axes, |chart| {
                 for run in points.split(|(_, y)| !y.is_finite()) {

@@ -202,8 +202,8 @@ mod tests {
 
     type Row = ([f64; TERMS], f64);
 
-    /// Generates rows of a known solution, with errors of a tenth in the values. If the values were only error, the
-    /// solution would be near zero and the relative rounding error large.
+    /// Generates rows whose values follow from a known solution, with errors of up to 0.1. With random values instead,
+    /// the solution would be near zero and its relative rounding error large.
     fn rows(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Row>> {
         let row = (prop::array::uniform5(-1.0..1.0), -0.1..0.1f64).prop_map(|(row, error)| {
             (row, error + row.iter().zip(TRUTH).map(|(x, c)| x * c).sum::<f64>())

@@ -23,10 +23,10 @@
 //! In all hypotheses, e follows Student's t distribution with 3, 10 or 1e6 (Gaussian) degrees of
 //! freedom, so that a few jumps do not change the scale much (Lange, Little and Taylor 1989, doi
 //! 10.1080/01621459.1989.10478852). For n samples, the parameter b costs half of ln n. Jitter is
-//! accepted if it is the most likely hypothesis, and if it explains as large a share of the
-//! residual's power above the noise as a [course in time](super::course) has to explain. Constant
-//! delays and other errors that persist while the signal moves are predicted from the previous
-//! samples and leave little in e.
+//! accepted if it is the most likely hypothesis and if it explains half of the residual's power
+//! above the noise, as every [course in time](super::course) must. Constant delays and other errors
+//! that persist while the signal moves are predicted from the previous samples and leave little in
+//! e.
 
 use crate::missing::{
     coloured::{autoregression, innovations},

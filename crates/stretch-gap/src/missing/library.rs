@@ -5,7 +5,7 @@
 //! | --- | --- | --- |
 //! | curve | x^p, (x - centre)^p, knees at quantiles, exp(-x/w) at either end, waves of x | scales, ends, contacts, threads |
 //! | friction | v, abs v, v^2, sign v, friction that fades with speed; each also times x | viscous, dry and sticking friction |
-//! | memory | play, lag, delay, way since a reversal, or maximum of x; times x, or v | backlash, relaxation, delay, hysteresis, damage |
+//! | memory | play, lag, delay, travel since a reversal, or maximum of x; times x, or v | backlash, relaxation, delay, hysteresis, damage |
 //! | slow | lags of x^2 and of friction terms, travel, time in the trial or session; also times x | warming, wear, drift |
 //! | crossing | x of one signal times x, v or a memory of another | coupling |
 //! | commands | opening of a valve, its lag, both also times x; a rate that leaks through the openings | valves, supply |
@@ -25,8 +25,8 @@ use Factor::{
 };
 use RateForm::{Linear, Magnitude, Rising, Sign, SignedRoot, SignedSquare, Square, Striction};
 
-/// Half-widths of plays, and widths of the exponentials in x and in the way since a reversal, as
-/// shares of the range.
+/// Half-widths of plays, and widths of the exponentials in x and in the travel since a reversal, as shares of the
+/// range.
 const WIDTHS: [f64; 5] = [0.015, 0.04, 0.1, 0.2, 0.4];
 /// Quantiles of the signal at which knees lie.
 const QUANTILES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];

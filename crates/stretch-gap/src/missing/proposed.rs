@@ -195,7 +195,7 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
         Factor::Peak { signal } => format!("(greatest {0} - {0})", x(signal)),
         Factor::Turned { signal, width } => {
             format!(
-                "sign({}) (1 - exp(-way since turn of {}/{}))",
+                "sign({}) (1 - exp(-travel since reversal of {}/{}))",
                 v(signal),
                 x(signal),
                 three_digits(width)

@@ -71,7 +71,7 @@ pub struct ProblemSpec {
     /// Column that a sensor measures, if the output `signal` is the signal of this sensor. The diagnosis then reports how much the gap degrades
     /// a calibration of the sensor, and evaluates the gap by levels of this column.
     pub reference: Option<String>,
-    /// Output of a stage that is a sensor; with `reference`.
+    /// Output of a stage that is a sensor; requires `reference`.
     pub signal: Option<String>,
     /// Time column; default `time_s`.
     pub time: Option<String>,
@@ -79,7 +79,7 @@ pub struct ProblemSpec {
     pub time_unit: Option<TimeUnit>,
     /// Greatest number of runs of the simulator.
     pub budget: Option<NonZeroUsize>,
-    /// The stages; needed unless the simulator is built in.
+    /// The stages; required unless the simulator is built in.
     #[serde(rename = "stage", default, skip_serializing_if = "Vec::is_empty")]
     pub stages: Vec<StageEntry>,
     /// Unit and noise of input columns of stages, if they are known.
@@ -95,7 +95,7 @@ pub struct ProblemSpec {
     /// The diagnosis does not search for these wrappers. `--fix` writes them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wrapped: Vec<EffectEntry>,
-    /// The recordings; needed unless the simulator is built in.
+    /// The recordings; required unless the simulator is built in.
     #[serde(rename = "trial", default, skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<TrialFile>,
     /// Kinds of effects of the user's own, which `wrap` may name in addition to the kinds of the catalogue.
@@ -225,7 +225,7 @@ struct WrittenEffect {
     /// Unit; empty if there is none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     unit: String,
-    /// Smallest and largest plausible value; needed without `[[effect.argument]]`.
+    /// Smallest and largest plausible value; required if there is no `[[effect.argument]]`.
     #[serde(default, deserialize_with = "range")]
     range: Option<[f64; 2]>,
     /// Value at which it does nothing; omitted for a shape parameter.

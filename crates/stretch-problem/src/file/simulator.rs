@@ -39,7 +39,7 @@ pub struct SimulatorEntry {
     pub data_set: Option<String>,
     /// For a built-in simulator: its rig file; default: that of the data set.
     pub rig: Option<String>,
-    /// For a gauge: column of its reference, if it is not the default one; with `signal`.
+    /// For a gauge: column of its reference, if it is not the default one; requires `signal`.
     pub reference: Option<String>,
     /// For a gauge: column of its signal.
     pub signal: Option<String>,

@@ -166,7 +166,7 @@ fn dead_band_sketch(valves: &[DeadBand; 2]) -> Sketch {
     let side = "0 at the inlet, 1 at the outlet; each has a state of its own";
     let mut sketch = Sketch::of(Quantity::new("u", "1", "commanded opening, 0 to 1"), body)
         .beside(Quantity::new("side", "1", side))
-        .giving(Quantity::new("y", "1", "opening with the dead band"))
+        .giving(Quantity::new("y", "1", "opening after the dead band"))
         .with_all(&[("INLET", valves[0].u_db, "1"), ("OUTLET", valves[1].u_db, "1")]);
     if softness != 0.0 {
         sketch = sketch.with("SOFTNESS", softness, "1");

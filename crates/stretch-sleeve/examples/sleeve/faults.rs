@@ -1,5 +1,5 @@
 //! Simulates lost channels: how soon they are found, the errors of the remaining channels, and how
-//! often a working channel is taken for lost.
+//! often a working channel is wrongly excluded as faulty.
 
 use stretch_data::Trial;
 use stretch_sleeve::{

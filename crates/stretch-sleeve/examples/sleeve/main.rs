@@ -19,7 +19,7 @@
 //!
 //! `--auto` also judges the automatic choice of a model. `--leave sensor` judges each sensor with priors from all other
 //! sensors. `--faults` judges only lost channels. `--zero` tests whether single gauges detect that they were put on
-//! again. `--simulated` counts how often a working gauge is taken for lost in simulated hours.
+//! again. `--simulated` counts how often a working gauge is wrongly excluded as faulty in simulated hours.
 
 mod data;
 mod faults;

@@ -1,4 +1,4 @@
-//! Counts how often a gauge is taken for lost in hours of simulated gauges without a fault.
+//! Counts how often a gauge without a fault is wrongly excluded as faulty in simulated hours.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

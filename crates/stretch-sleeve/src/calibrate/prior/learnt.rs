@@ -325,7 +325,7 @@ fn copy(session: &Session, before: &[Session]) -> Option<String> {
 fn differs(session: &Session, first: &Session) -> Option<String> {
     if session.signals.len() != first.signals.len() {
         return Some(format!(
-            "it has {} channels ({}) and {} has {} ({}): a prior takes sessions of the same channels",
+            "it has {} channels ({}) and {} has {} ({}): all sessions of a prior need the same channels",
             session.signals.len(),
             listed(&session.signals),
             first.name,

@@ -254,7 +254,7 @@ fn data_of_another_kind_are_refused_with_what_to_do() {
     let slower = |t: &mut Trial| t.time_s.iter_mut().for_each(|t| *t *= 2.0);
     refused(&slower, usual(), "--grid 50");
     let two = UpdateOptions { signals: vec!["s1".into(), "s2".into()], ..usual() };
-    refused(&|_| {}, two, "1 channels (s1), and 2 were named");
+    refused(&|_| {}, two, "1 channels (s1), but 2 were given");
     let radian = UpdateOptions { reference: "angle_rad".into(), ..usual() };
     refused(&|_| {}, radian, "stretch convert");
     let few = Prior::learn(&[summed(0, 0, &["s1"])]).unwrap_err().to_string();

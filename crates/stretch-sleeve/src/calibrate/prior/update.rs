@@ -227,7 +227,7 @@ impl Prior {
     ) -> Result<(), SleeveError> {
         if signals.len() != self.signals.len() {
             return refused(format!(
-                "it has {} channels ({}), and {} were named: name as many with --signal, in that order, or learn a prior from these",
+                "it has {} channels ({}), but {} were given: give {0} with --signal, in that order, or learn a new prior from these",
                 self.signals.len(),
                 self.signals.join(","),
                 signals.len()

@@ -16,7 +16,8 @@ pub fn root() -> PathBuf {
 /// Returns the folder of one data set. A test that calls this is `#[ignore]`d; `./ci.sh` runs it if
 /// the data are available.
 ///
-/// # Panics If the folder does not exist. The message says where to get the data.
+/// # Panics
+/// If the folder does not exist. The message says where to get the data.
 ///
 /// ```should_panic
 /// testkit::measured::folder("nobody_recorded_this");

@@ -24,15 +24,15 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
         constants
             .define("SLIP", model.slip, "half-width of the sleeve's slip")
             .define("SMOOTH", SMOOTH as f32, "share of a sample in the smoothed signal")
-            .define("TURN_THRESHOLD", model.turn_threshold, "signal change back that counts as a turn")
-            .define("SLIP_VARIANCE", model.slip_variance, "variance of the target if it may be anywhere in the slip")
-            .define("SLIP_VARIANCE_SHARE", model.slip_variance_share, "step per sample towards that variance, as a share");
+            .define("TURN_THRESHOLD", model.turn_threshold, "smallest signal change of a turn")
+            .define("SLIP_VARIANCE", model.slip_variance, "SLIP^2/3: target anywhere in the slip")
+            .define("SLIP_VARIANCE_SHARE", model.slip_variance_share, "low-pass gain per sample");
     }
     if has.contains(&"slip") || has.contains(&"hysteresis") {
         has.push("initial_hysteresis");
         let [initial, slope] = model.defects.initial_hysteresis;
         constants
-            .define("INITIAL_HYSTERESIS", initial, "initial state of the plays (-1 to 1) at a target of 0")
+            .define("INITIAL_HYSTERESIS", initial, "initial play state (-1..1) at a target of 0")
             .define("INITIAL_HYSTERESIS_SLOPE", slope, "change of that state per target");
     }
     if model.ahead_s != 0.0 {
@@ -65,7 +65,7 @@ fn filter(constants: &mut Constants, model: &Diagnosed<f32>) {
         .define("DRIVE_LOW", curve.low, "the drive of the first knot")
         .define("DRIVE_STEP", curve.step, "distance of knots")
         .define("PER_STEP", curve.per_step, "1 / DRIVE_STEP")
-        .define("LEAST_RUN", LEAST_RUN as f32 * curve.step, "smallest drive difference for a secant slope")
+        .define("LEAST_RUN", LEAST_RUN as f32 * curve.step, "least drive change of a secant")
         .define("LEAST_ANSWER", LEAST_ANSWER as f32, "least slope of the drive over the target")
         .define("KEPT", model.kept, "share of the rate kept per sample")
         .define("KEPT_TWICE", model.kept_twice, "the same squared")

@@ -89,7 +89,7 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
         .define("DRIVE_LOW", o.drive_low, "the drive of the first knot")
         .define("DRIVE_STEP", o.drive_step, "distance of knots")
         .define("PER_STEP", o.per_step, "1 / DRIVE_STEP")
-        .define("LEAST_RUN", LEAST_RUN * o.drive_step, "smallest drive difference for a secant slope");
+        .define("LEAST_RUN", LEAST_RUN * o.drive_step, "least drive change of a secant");
     constants.define("LEAD_S", o.lead_s, "seconds by which the signal leads");
     define_memory(
         &mut constants,

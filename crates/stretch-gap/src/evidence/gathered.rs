@@ -73,7 +73,7 @@ pub struct Evidence {
     pub retuned: Model,
     /// Best set of effects, whether the verdict names it or not.
     pub best: Model,
-    /// Multiple of the simulator's usual step of integration that every run took.
+    /// Step of integration of every run, as a multiple of the simulator's usual step.
     pub step: f64,
     /// Fitted model of every candidate, in the order of the candidates in the diagnosis.
     pub candidates: Vec<Model>,
@@ -138,8 +138,9 @@ impl Traces {
 }
 
 /// Returns a difference of outputs in multiples of the noise, first as it is, then without the most
-/// likely nuisances. From the test trials, the spectral lines of the model, which were not fitted
-/// there, are removed in both. Both results are linear in the difference.
+/// likely nuisances. The test trials were not fitted, so the phases of the model's spectral lines
+/// are unknown there. Both results therefore have these lines removed from the test trials. Both
+/// are linear in the difference.
 pub(crate) fn held_out(
     problem: &PreparedProblem<'_>,
     stage: usize,

@@ -30,14 +30,14 @@ pub struct EffectShare {
     /// Effect.
     pub effect: String,
     /// Share of the re-tuned nominal simulator's gap that opens again when the effect is removed,
-    /// after the weaker ones: the shares add up to what the set closes.
+    /// after all weaker effects were removed. The shares add up to the share that the set closes.
     pub closes: f64,
-    /// What it closes of the stage in which it closes most, in variances of the noise: the larger
-    /// of fitted and test trials.
+    /// Excess that the effect closes in the stage in which it closes most, in variances of the
+    /// noise; the larger of the values on fitted and on test trials.
     #[serde(default)]
     pub closes_excess: f64,
-    /// Whether one of its parameters reached an end of its range. It then rather compensates for
-    /// something else.
+    /// Whether one of its parameters reached an end of its range. The effect then probably
+    /// compensates for another cause.
     pub at_bound: bool,
 }
 

@@ -146,7 +146,7 @@ mod tests {
         );
     }
 
-    /// If an effect reads the true course of another output, without its error, its explanation
+    /// If an effect reads the true values of another output, without their error, what it explains
     /// counts in full.
     #[test]
     fn what_is_read_of_errors_of_their_own_counts() {

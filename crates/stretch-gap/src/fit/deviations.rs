@@ -51,8 +51,8 @@ use crate::{
 /// Time constants of further poles, samples.
 const LAGS: [f64; 3] = [3.0, 30.0, 300.0];
 
-/// Largest coefficient, in standard deviations: an effect whose form would have to change by more
-/// is another effect.
+/// Largest coefficient of a deviation, in standard deviations. If the form would have to deviate by more, the effect is
+/// another one.
 const MOST: f64 = 2.0;
 
 impl PreparedProblem<'_> {

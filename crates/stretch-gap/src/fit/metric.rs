@@ -64,8 +64,8 @@ pub(crate) struct Loose {
     knots: Arc<[Arc<Knots>]>,
 }
 
-/// Returns the knots of a drift in each segment. `clock` holds, for every sample, the last sample at which the drift
-/// could reach the output.
+/// Returns the knots of a drift in each segment. `clock` holds, for every sample, the index of the last sample so far
+/// at which the drift could reach the output (a drift of the supply, for example, only while the inlet is open).
 fn knots_of(clock: &[u32], roles: &SampleRoles, dt_s: f64) -> Arc<[Arc<Knots>]> {
     roles.segments.iter().map(|s| Arc::new(Knots::of(&clock[s.from..s.to], dt_s))).collect()
 }

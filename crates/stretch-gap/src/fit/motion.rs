@@ -29,12 +29,12 @@ const LEAST_PARTS: usize = 8;
 const DRAWS: usize = 399;
 /// Significance level: largest share of draws whose T is at least as large.
 const RARE: f64 = 0.01;
-/// Smallest variance that counts of the part of the residual that depends on the motion, in
-/// variances of the noise. Any machine has faint unmodelled effects, and in a long recording they
-/// would be significant.
+/// Smallest variance of the motion-dependent part of the residual that counts, in variances of the
+/// noise. Any machine has faint unmodelled effects, and in a long recording they would be
+/// significant.
 const LEAST_VARIANCE: f64 = 0.05;
-/// Largest change of the output within a block for which the output is at rest, as a share of its
-/// range.
+/// Largest change of the output within a block at which the output counts as at rest, as a share of
+/// its range.
 const AT_REST: f64 = 1e-3;
 
 /// Whether a residual, in multiples of the noise, depends significantly on the level or the

@@ -93,9 +93,10 @@ impl Octaves {
         self
     }
 
-    /// Returns the mean squares without possible model discrepancy. The discrepancy in an octave is
-    /// at most the share `of_closed` of the part that was closed relative to `nominal` in this
-    /// octave. It is subtracted only as far as `next` leaves less.
+    /// Returns the mean squares without possible model discrepancy. In each octave, the share
+    /// `of_closed` of the reduction from `nominal` may be discrepancy and is subtracted. The result
+    /// is not below what `next` leaves, unless `next` leaves more than this hypothesis; then
+    /// nothing is subtracted.
     pub(crate) fn less_discrepancy(mut self, nominal: &Self, next: &Self, of_closed: f64) -> Self {
         for ((x, nominal), next) in self.sums.iter_mut().zip(nominal.sums).zip(next.sums) {
             let may_be_left = of_closed * (nominal - *x).max(0.0);

@@ -72,9 +72,10 @@ pub(crate) struct PreparedProblem<'a> {
 impl<'a> PreparedProblem<'a> {
     /// Determines sample roles, noise, metrics, re-tuning, sample sizes and transmitted noise.
     ///
-    /// # Errors [`GapError::Solver`] if the step of integration is so long that its error is
-    /// visible, [`GapError::TooLittle`] if there is nothing to fit, [`GapError::Measured`] if
-    /// measurements are missing, and errors of the simulator.
+    /// # Errors
+    /// [`GapError::Solver`] if the step of integration is so long that its error is visible,
+    /// [`GapError::TooLittle`] if there is nothing to fit, [`GapError::Measured`] if measurements
+    /// are missing, and errors of the simulator.
     pub(crate) fn prepare(
         simulator: &'a dyn Simulator,
         stop: &'a (dyn Fn() -> bool + Sync),
@@ -236,8 +237,8 @@ impl<'a> PreparedProblem<'a> {
         Ok(fitted)
     }
 
-    /// Returns the residual of an output with and without the model's effects that read other
-    /// outputs. `None` if no effect of the catalogue makes this output read another or reads it.
+    /// Returns the residual of an output with and without the model's effects that read other outputs. `None` if no
+    /// effect of the catalogue connects this output with another one.
     fn read(&self, misfit: &Misfit, model: &Model) -> Result<Option<Read>, GapError> {
         let (stage, compare) = (misfit.stage, &self.compare);
         let effects = self.simulator().effects();
@@ -402,8 +403,8 @@ impl<'a> PreparedProblem<'a> {
         (0..hypothesis.misfits.len()).map(|stage| self.gap_in(hypothesis, stage)).sum()
     }
 
-    /// Returns the number of samples that count as one observation in the stage in which it is
-    /// smallest, as a share of a block.
+    /// Returns the number of samples that count as one observation, as a share of a block: the smallest such number of
+    /// all stages.
     pub(crate) fn finest(&self) -> f64 {
         let memory = self.memory.iter().copied().fold(f64::INFINITY, f64::min);
         (memory / self.compare.roles.block as f64).min(1.0)

@@ -98,8 +98,9 @@ impl SampleValue {
 /// `samples` holds indices into the concatenated trials, in ascending order. `noise` holds one
 /// standard deviation of the noise by stage.
 ///
-/// # Errors Errors of the simulator; an error if a measured channel is shorter than the trials or
-/// not finite; an error if the budget of runs is spent before the fit ends.
+/// # Errors
+/// Errors of the simulator; an error if a measured channel is shorter than the trials or not finite;
+/// an error if the budget of runs is spent before the fit ends.
 pub fn fit_samples(
     simulator: &dyn Simulator,
     noise: &[f64],

@@ -62,9 +62,8 @@ const ALIKE: f64 = 0.01;
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Starts {
-    /// Number of points within the tolerances from which parameters were re-tuned. It is 1 if no
-    /// other point came near the result from the parameters as shipped, 0 in a diagnosis of an
-    /// older version.
+    /// Number of points within the tolerances from which parameters were re-tuned. It is 1 if re-tuning from the
+    /// parameters as shipped was not repeated, and 0 if an older version wrote the diagnosis.
     pub tried: usize,
     /// How many of them ended at the best result.
     pub agreed: usize,

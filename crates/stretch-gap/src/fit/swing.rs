@@ -53,8 +53,7 @@ const TURNS: f64 = 2.0;
 /// Largest number of frequencies that are tried, the low ones first. It suffices for all
 /// frequencies of a segment of five minutes.
 const MOST: usize = 1500;
-/// Number of frequencies on either side of a frequency, from whose power the usual power is
-/// determined.
+/// Number of neighbouring frequencies on either side, whose median power is the usual power at a frequency.
 const BESIDE: usize = 10;
 /// Number of peaks at which B is computed: those whose power exceeds the usual power most.
 const PEAKS: usize = 6;

@@ -6,10 +6,10 @@
 //! | function | a sum of terms (either many or a few) plus a stationary coloured process |
 //! | coloured | a stationary coloured process alone, which depends on no recorded signal |
 //!
-//! Both processes are autoregressions of means over 0.1 s with a memory of 0.5 s. They are fitted
-//! to the fitted samples by least squares (Box and Jenkins 1970, chapter 7). With the errors e of
-//! their one-step predictions in the held-out samples, and the variance s^2 of these errors in the
-//! fitted samples, the score is
+//! Both processes are autoregressions of means over 0.1 s with a memory of 0.5 s. Their weights are
+//! estimated from the fitted samples by least squares (Box and Jenkins 1970, chapter 7). With the
+//! errors e of their one-step predictions in the held-out samples, and the variance s^2 of these
+//! errors in the fitted samples, the score is
 //!
 //! ```text
 //! L = -0.5 sum (ln 2 pi s^2 + e^2/s^2)

@@ -2,9 +2,9 @@
 //! courses: time stamps jitter, or the residual swings, jumps or drifts.
 //!
 //! The residual r of N samples is in multiples of the noise, over stretches without a break. A
-//! course has to explain at least half of the power above the noise, sum r^2 - N. Jumps have to
-//! explain at least half of the same power of the changes d_i = r_(i+1) - r_i, which is sum d^2 - 2
-//! N. The first course in the table that does is reported:
+//! course has to explain at least half of the power above the noise, sum r^2 - N. For jumps, the
+//! changes d_i = r_(i+1) - r_i take the place of r, and their power above the noise is sum d^2 - 2
+//! N. The first course in the table that explains enough is reported:
 //!
 //! | course | explained part | numbers |
 //! | --- | --- | --- |

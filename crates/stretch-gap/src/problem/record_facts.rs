@@ -125,9 +125,10 @@ pub struct RecordFacts {
     ///
     /// Variation from one switch to the next is described [per tick](ParameterSpec::per_tick_sd).
     pub command_timing: Vec<(usize, ParameterSpec)>,
-    /// Parameters, by index, whose slow drift cannot reach the outputs at certain times. Each has a
-    /// clock: for every sample, the last sample (counted from the trial's start) at which the drift
-    /// could reach the outputs.
+    /// Clocks of parameters, by index, with one value for every sample. If the slow drift of a
+    /// parameter cannot reach the outputs at certain times, the clock is the last sample so far
+    /// (counted from the trial's start) at which it could. If a parameter has an [offset for each
+    /// tick](ParameterSpec::per_tick_sd), the clock counts the ticks.
     pub drift_clocks: Vec<(usize, Vec<u32>)>,
 }
 

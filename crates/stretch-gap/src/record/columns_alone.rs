@@ -215,8 +215,8 @@ fn repeats_itself(values: &[f64], dt_s: f64) -> bool {
     (1..=BLOCK).any(|lag| product(lag).abs() > REPEATS * all)
 }
 
-/// Returns the stretches in which a column repeats one value, not an end of its range, so often
-/// that noise would do so once in a billion recordings, while another column moves.
+/// Returns the stretches in which a column repeats one value while another column moves. The value is not an end of the
+/// range, and it is repeated so often that noise alone would repeat it in one of a billion recordings.
 ///
 /// A sensor behind a play or a dead band also repeats values. A stretch therefore counts only if
 /// the column has white noise, if it jumps at the end of the stretch (the output of a play

@@ -63,7 +63,8 @@ impl Acceptance<'_> {
             && (is_beyond || self.left(next, new) <= unknown_excess)
     }
 
-    /// Whether an effect on top of `base` could close more than the remaining model discrepancy.
+    /// Whether an effect that is added to `base` could close more than the remaining model
+    /// discrepancy.
     pub(crate) fn is_possible(&self, base: &Hypothesis, effect: usize) -> bool {
         let mut touched = self.touched(effect).iter();
         touched.any(|&s| self.problem.gap_in(base, s) >= self.discrepancy(base, s))

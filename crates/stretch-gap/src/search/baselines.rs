@@ -45,8 +45,8 @@ pub struct Baselines {
 
 /// Number of single effects that the information criterion compares: the best of the screen.
 const KEPT: usize = 8;
-/// Size of a correlation that noise alone almost never reaches, in standard deviations. Samples
-/// count as independent.
+/// Smallest correlation that counts, in standard deviations: noise alone almost never reaches it. Samples count as
+/// independent.
 const FAR: f64 = 4.0;
 /// Number of starts of an effect that are fitted.
 const STARTS: usize = 2;

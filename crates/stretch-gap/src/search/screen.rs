@@ -33,7 +33,7 @@ const SCALED: f64 = 8.0;
 /// Smallest change that counts, as a sum of squares in multiples of the noise variance.
 const NO_CHANGE: f64 = 1e-9;
 
-/// Number of values that are tried between a threshold that changes nothing and one that changes
+/// Number of threshold values that are tried between one that changes nothing and one that changes
 /// too much.
 const BETWEEN: usize = 7;
 

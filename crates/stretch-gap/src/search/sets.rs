@@ -482,8 +482,8 @@ fn key(effects: &[usize], more: Option<usize>) -> Vec<usize> {
     key
 }
 
-/// Distance from the shipped value, in tolerances, from which a re-tuned parameter counts as far;
-/// one in seven is as far by chance.
+/// Distance from the shipped value, in tolerances, from which on a re-tuned parameter counts as
+/// moved far. By chance, one parameter in seven moves as far.
 const FAR: f64 = 1.5;
 
 /// Returns a model with one more effect in which parameters that re-tuning moved far are reset to

@@ -53,8 +53,8 @@ fn all<'a>(
     own.chain(model.effects.iter().map(|(i, values)| (rows[*i], values.as_slice())))
 }
 
-/// Spectral lines, in units of the output, that the effects of a simulator and of a model leave in
-/// the test samples.
+/// Returns the spectral lines that the effects of a simulator and of a model add to the test samples. Their amplitudes
+/// are multiplied by `unit`.
 pub(crate) fn lines(
     base: &EffectSet,
     rows: &[&'static Effect],

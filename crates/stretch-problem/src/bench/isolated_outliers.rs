@@ -5,11 +5,11 @@
 //! ```text
 //! d_i = x_i - (-x_(i-2) + 4 x_(i-1) + 4 x_(i+1) - x_(i+2))/6
 //! ```
+//!
 //! The sample is an outlier if |d_i| exceeds two limits: eight standard deviations of d over the recording plus half of
 //! the greater of the steps x_(i-1) - x_(i-2) and x_(i+2) - x_(i+1), and 1.25 times |d| of either neighbour. Therefore
 //! a step of the motion is no outlier, and neither is a kink from rest. A sharp reversal at nearly equal speeds stays
 //! below the limit only because of the noise. An outlier is replaced by the value of the cubic.
-//! outlier is replaced by the value of the cubic.
 
 use stretch_data::SessionTrial;
 

@@ -1,4 +1,5 @@
-//! Estimates the command from before a trial. The operators in front of a stage begin the trial with this command.
+//! Estimates the command that acted before a trial. The operators in front of a stage begin the trial with this
+//! command.
 //!
 //! If the first sample of a trial is already a step of the command, the output still rests at the
 //! command from before the step, which was not recorded. An operator with memory in front of the

@@ -67,7 +67,7 @@ impl RecordedSession {
     }
 }
 
-/// One run that a source is asked for: a request.
+/// A request for one run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ask<'a> {
     /// Index of the stage.
@@ -83,7 +83,7 @@ pub struct Ask<'a> {
     /// Columns that drive other stages and are altered as well; empty unless the source [takes inputs of several
     /// stages](Source::takes_inputs_of_several).
     pub others: &'a [AlteredColumn<'a>],
-    /// Number of the session's trials, from the first.
+    /// Number of trials to simulate, from the first one of the session.
     pub trials: usize,
 }
 
@@ -152,7 +152,7 @@ pub enum SourceError {
         first: f64,
         /// Second answer.
         second: f64,
-        /// How many trials each of the two runs was over.
+        /// Number of trials of each of the two runs.
         over: [usize; 2],
     },
     /// No more runs may be made.

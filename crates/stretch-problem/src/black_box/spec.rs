@@ -101,7 +101,7 @@ pub struct ProblemSpec {
     /// Kinds of effects of the user's own, which `wrap` may name in addition to the kinds of the catalogue.
     #[serde(skip)]
     pub kinds: Vec<&'static Kind>,
-    /// A column that distinguishes runs, which no effect looks at.
+    /// A column that distinguishes runs; no effect uses it.
     #[serde(skip)]
     pub by: Option<String>,
     /// Recordings in memory; [`ProblemSpec::load`] reads these.
@@ -180,11 +180,13 @@ pub struct Parameter {
     pub unit: String,
     /// Nominal value in the simulator.
     pub value: f64,
-    /// One standard deviation, a number in the unit or a share such as `"10 %"`; the value is exact without it.
+    /// One standard deviation: a number in the unit of the value, or a share such as `"10 %"`. By default, the value is
+    /// exact.
     #[serde(default, with = "tolerance", skip_serializing_if = "tolerance::is_exact")]
     #[schemars(schema_with = "tolerance::schema")]
     pub tolerance: Tolerance,
-    /// Smallest plausible value. Without it, a value whose tolerance is a share of it, or less than it, keeps its sign.
+    /// Smallest plausible value. By default, the value keeps its sign if its tolerance is relative or smaller than the
+    /// value.
     pub least: Option<f64>,
     /// Greatest plausible value.
     pub greatest: Option<f64>,
@@ -204,9 +206,9 @@ pub struct OwnEffect {
     pub name: String,
     /// Its arguments.
     pub arguments: Vec<Argument>,
-    /// Stages that the effect acts in; all stages where none is named.
+    /// Stages that the effect acts in; all stages if none is named.
     pub stages: Vec<String>,
-    /// Names of effects that are hard to tell from it.
+    /// Names of effects that are hard to distinguish from it.
     pub twins: Vec<String>,
 }
 
@@ -284,7 +286,8 @@ impl OwnEffect {
         self.arguments.iter().any(|a| a.value.is_some())
     }
 
-    /// Name of an argument's value for the simulator: the effect's name, or `effect.argument` where the effect has several arguments.
+    /// Name of an argument's value for the simulator: the effect's name, or `effect.argument` if the effect has several
+    /// arguments.
     pub(crate) fn value_name(&self, argument: &Argument) -> String {
         match self.arguments.len() {
             1 => self.name.clone(),

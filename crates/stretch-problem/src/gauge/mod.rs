@@ -34,8 +34,8 @@ use crate::{
 const OFFSET: usize = 0;
 /// Index of the gain.
 const GAIN: usize = 1;
-/// Index of the initial hysteresis state. It says how the memories of the gauge begin the session: after a motion from
-/// below (1), after a motion from above (-1), or settled (0).
+/// Index of the initial hysteresis state. At the start of the session, the memories of the gauge are as after a motion
+/// from below (1), as after a motion from above (-1), or settled (0).
 const INITIAL_STATE: usize = 2;
 
 /// The data from which a [`GaugeSimulator`] is built.

@@ -10,7 +10,7 @@ use super::cache::LastResults;
 const WIDEST: usize = 15;
 /// Smallest half-width of a smoothing window, in samples.
 const NARROWEST: usize = 2;
-/// Longest time that the greatest and the least half-width may last, s. At a low rate the windows have fewer samples,
+/// Longest duration of the greatest and of the least half-width, s. At a low rate the windows have fewer samples,
 /// because a valve acts just as fast there. A window of less than [`NARROWEST`] samples on either side is not smoothed.
 const LONGEST_S: [f64; 2] = [0.15, 0.02];
 /// Greatest half-width of a window, as a share of the time since the last command minus [`WAKE_S`].
@@ -144,8 +144,8 @@ impl Smoothed {
     /// A random draw of the noise, smoothed like the recording, and of the corners between two
     /// rows.
     ///
-    /// Let the slope change by d a sample at a corner that lies a share a of a sample before row i. The corner then
-    /// lies a (1 - a) d below the straight line from row i - 1 to row i. A stage that is slow compared with a row
+    /// Let the slope change by d per sample at a corner that lies the fraction a of a sample before row i. The corner
+    /// then lies a (1 - a) d below the straight line from row i - 1 to row i. A stage that is slow compared with a row
     /// responds only to the area under the input. A quarter of that distance is subtracted from both rows, which
     /// removes the same area.
     fn drawn(&self, noise: &Noise, random: &mut RandomGenerator) -> Vec<f64> {

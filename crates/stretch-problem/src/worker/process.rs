@@ -25,7 +25,7 @@ const LINES: usize = 12;
 const LINE_BYTES: usize = 400;
 /// Longest body, in bytes, of an answer that needs no body.
 pub(super) const NO_BODY: u64 = 1 << 16;
-/// Longest time for which a worker is awaited to end.
+/// Longest time to wait for the end of a worker.
 const LEAVES: Duration = Duration::from_millis(500);
 
 type Last = Arc<Mutex<VecDeque<String>>>;

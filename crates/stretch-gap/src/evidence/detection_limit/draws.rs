@@ -29,7 +29,8 @@ use crate::{
     },
 };
 
-/// Number of recordings that are drawn. They determine a probability of 0.9 to 0.02.
+/// Number of recordings that are drawn. They determine a probability of 0.9 with a standard
+/// deviation of 0.02.
 const DRAWS: usize = 200;
 /// Probability with which an effect at its limit is named.
 const POWER: f64 = 0.9;

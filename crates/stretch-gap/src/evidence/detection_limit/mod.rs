@@ -46,8 +46,8 @@ use crate::{
     search::selection::Looked,
 };
 
-/// Number of bisection steps after a limit is bracketed within the ratio [`STEP`]. They determine
-/// it to 1 %.
+/// Number of bisection steps after a limit is bracketed within the ratio [`STEP`]. They determine the limit with an
+/// accuracy of 1 %.
 const HALVINGS: usize = 6;
 /// Strengths below this share of the range are not tried.
 const LEAST: f64 = 1e-6;

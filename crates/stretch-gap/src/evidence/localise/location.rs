@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Gap of one stage on the test trials, every stage on its measured input.
+/// Gap of one stage on the test trials. Each stage is simulated from its measured input.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct StageGap {
     /// Stage.
@@ -27,9 +27,8 @@ pub struct StageGap {
     pub floor_source: String,
     /// Unit of `rms` and `floor`.
     pub unit: String,
-    /// Whether this is the reference that measures lengths, which the simulator does not model as a
-    /// stage: only the cause of the gap is there. Its numbers are what its effects close in the
-    /// channels in which they show.
+    /// Whether the entry is not a stage of the simulator but a cause of the gap, such as the reference sensor that
+    /// measures lengths. Its numbers are then what its effects close in the channels in which they show.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_cause_only: bool,
 }

@@ -18,7 +18,8 @@ fn cubic() -> Toy {
     Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(Effect::Cubic, &[0.2])])
 }
 
-/// y = gain (x + c x^3) + zero: the output answers to c by gain x^3 a unit, wherever c is turned to.
+/// Because y = gain (x + c x^3) + zero, the response of the output to c is gain x^3 per unit of c, for every value of
+/// c.
 #[test]
 fn answers_to_a_strength_are_linear() {
     let (told, evidence, responses) = answered(&cubic(), 1);
@@ -37,8 +38,8 @@ fn answers_to_a_strength_are_linear() {
     assert!(own.answers.windows(2).all(|pair| pair[0].value < pair[1].value));
 }
 
-/// A time constant is no strength: near the fit its answers are a straight line, and farther away they bend. From a quarter of the reach to half of
-/// it they double but for a share that is of the order of the step.
+/// The response to a time constant is linear only near the fitted value. It should double from a quarter of the reach
+/// to half of it, up to an error of the order of the step.
 #[test]
 fn answers_to_a_time_are_linear_near_the_fit() {
     let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(Effect::Slow, &[0.05])]);
@@ -57,12 +58,12 @@ fn answers_to_a_time_are_linear_near_the_fit() {
             let square = side[i].output.iter().map(|y| y * y).sum::<f64>();
             square.sqrt() / by.abs()
         };
-        // Second order in w tau, with w up to 4.5 rad/s and tau to 0.1 s: 0.2.
+        // The error is of second order in w tau. With w up to 4.5 rad/s and tau up to 0.1 s, it is 0.2.
         assert!((slope(0) / slope(1) - 1.0).abs() < 0.2, "{} {}", slope(0), slope(1));
     }
 }
 
-/// The products tell what would be left: of a number turned to one of its values exactly what a run with it leaves of the test trials.
+/// The mean square that a changed parameter value would leave on the test trials follows exactly from the products.
 #[test]
 fn products_tell_what_is_left() {
     let (_, evidence, responses) = answered(&cubic(), 3);
@@ -78,7 +79,7 @@ fn products_tell_what_is_left() {
         }
     }
     assert!((products[0][0] - 1.0 - stage.excess_after).abs() < 1e-9, "{}", products[0][0]);
-    // Nothing moves slowly in this toy: what is left is white, and its square is that of the residuals.
+    // This toy has no slow drift, so the metric is that of white noise, and mean squares are those of the residuals.
     let level = (stage.noise / 0.01).powi(2);
     for (k, answer) in responses.parameters[0].answers.iter().enumerate() {
         let test = 3000..4000;
@@ -87,7 +88,7 @@ fn products_tell_what_is_left() {
         let own = k + 1;
         let told = products[0][0] - 2.0 * products[0][own] + products[own][own];
         assert!((square / told - 1.0).abs() < 1e-6, "{square} {told}");
-        // It was fitted: whatever it is turned to leaves more, but for what chance of the test trial likes better.
+        // The parameter was fitted. Any other value leaves more, except by chance on the test trial.
         assert!(told > products[0][0] - 0.05, "{told} {}", products[0][0]);
     }
 }
@@ -96,14 +97,14 @@ fn products_tell_what_is_left() {
 fn answers_are_gathered_only_where_they_are_asked_for() {
     let (_, evidence) = evidenced(&cubic().measured(4), &Options::default());
     assert!(evidence.responses.is_none());
-    // Where nothing is missing there is no number to turn.
+    // If nothing is missing, there is no parameter to vary.
     let options = Options { responses: true, ..Options::default() };
     let (_, evidence) =
         evidenced(&Toy::of(&[Law::Line]).may_lack(&Effect::ALL).measured(4), &options);
     assert!(evidence.responses.is_none());
 }
 
-/// Asked for answers, the diagnosis is the same.
+/// Computing responses does not change the diagnosis.
 #[test]
 fn answers_change_nothing_of_the_diagnosis() {
     let plain = evidenced(&cubic().measured(5), &Options::default()).0;
@@ -111,7 +112,7 @@ fn answers_change_nothing_of_the_diagnosis() {
     assert_eq!(Diagnosis { runtime_s: 0.0, ..plain }, Diagnosis { runtime_s: 0.0, ..asked });
 }
 
-/// What is written as `diagnosis.json` is read back as it was, and has the keys that are promised.
+/// A diagnosis that is written as JSON and read back is unchanged, and has the documented keys.
 #[test]
 fn a_diagnosis_goes_through_json_whole() {
     let toys = [
@@ -125,7 +126,7 @@ fn a_diagnosis_goes_through_json_whole() {
         let (told, _) = evidenced(&toy.measured(7), &options);
         let text = serde_json::to_string(&told).expect("written");
         let back: Diagnosis = serde_json::from_str(&text).expect("read");
-        // Digits are written as far as they are read: the same to the bit, or a rounding apart.
+        // Numbers are equal to the bit, or differ by a rounding.
         assert_eq!(
             serde_json::to_value(&back).unwrap(),
             serde_json::from_str::<serde_json::Value>(&text).unwrap()
@@ -184,7 +185,7 @@ fn the_promised_keys_are_there() {
     keys(&json["parameters"][0], &["name", "nominal", "fitted", "sigmas"]);
     assert_eq!(json["schema"], 1);
     assert_eq!(json["verdict"], "effect");
-    // One effect: its numbers by their own names; several: with the effect before a point.
+    // With one effect, parameters have their own names; with several, `effect.parameter`.
     keys(&json["candidates"][0]["parameters"], &["c"]);
     let pair = cubic().hiding(&[(Effect::Cubic, &[0.3]), (Effect::Play, &[0.1])]);
     let (told, _) = evidenced(&pair.measured(8), &Options::default());
@@ -192,7 +193,7 @@ fn the_promised_keys_are_there() {
     keys(&json["candidates"][0]["parameters"], &["cubic.c", "play.w"]);
 }
 
-/// Records of the first version had fewer keys: what came later may be absent.
+/// Diagnoses of the first version had fewer keys, so keys that were added later may be absent.
 #[test]
 fn an_older_diagnosis_is_read() {
     let (told, _) = evidenced(&cubic().measured(9), &Options::default());

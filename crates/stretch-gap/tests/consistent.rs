@@ -1,15 +1,15 @@
-//! What every diagnosis must hold by itself, whatever it says: probabilities, lists, shares and the sentence agree with each other.
+//! Checks that hold for every diagnosis: probabilities, lists, shares and the sentence agree with each other.
 
 use crate::toys::Measured;
 use std::collections::BTreeSet;
 use stretch_gap::{Diagnosis, Evidence, Options, VerdictKind};
 
-/// The diagnosis of a recording, found consistent.
+/// Diagnoses a recording and checks that the diagnosis is consistent.
 pub(crate) fn told(measured: &Measured) -> Diagnosis {
     evidenced(measured, &Options::default()).0
 }
 
-/// The same with its evidence.
+/// As [`told`], with the evidence.
 pub(crate) fn evidenced(measured: &Measured, options: &Options) -> (Diagnosis, Evidence) {
     let (diagnosis, evidence) = measured.diagnosed_by(options);
     assert_consistent(&diagnosis, measured);
@@ -25,7 +25,7 @@ pub(crate) fn assert_consistent(told: &Diagnosis, measured: &Measured) {
     assert_sentence(told, measured);
 }
 
-/// Probabilities are those of alternatives: with what the catalogue lacks they sum to one.
+/// The probabilities, including that of a cause outside the catalogue, sum to one.
 fn assert_probabilities(told: &Diagnosis) {
     let sum: f64 = told.candidates.iter().map(|c| c.probability).sum();
     assert!((sum - 1.0).abs() < 1e-9, "{sum}");
@@ -35,7 +35,7 @@ fn assert_probabilities(told: &Diagnosis) {
     for pair in of_effects.windows(2) {
         assert!(pair[0].probability >= pair[1].probability, "{pair:?}");
     }
-    // A calibration of thresholds recomputes exactly the numbers of the answer.
+    // The probabilities that the calibration of thresholds recomputes are those of the diagnosis.
     let again = told.probabilities(&stretch_gap::Thresholds::frozen());
     for (candidate, p) in told.candidates.iter().zip(again) {
         assert!((candidate.probability - p).abs() < 1e-9, "{p}: {candidate:?}");
@@ -45,7 +45,8 @@ fn assert_probabilities(told: &Diagnosis) {
     assert_eq!(different.len(), sets.len(), "a set stands there twice: {sets:?}");
 }
 
-/// A verdict that names has names, any other has none; what is named, tied and faint are three lists, the first and the last of the first set.
+/// Only the verdicts `effect` and `partial` have names. No effect is in two of the lists named, tied and faint. Named
+/// and faint effects belong to the first set.
 fn assert_lists(told: &Diagnosis) {
     let names = matches!(told.verdict, VerdictKind::Effect | VerdictKind::Partial);
     assert_eq!(names, !told.named.is_empty(), "{:?} names {:?}", told.verdict, told.named);
@@ -65,7 +66,8 @@ fn assert_lists(told: &Diagnosis) {
     }
 }
 
-/// The 95 % set is the smallest: it holds 95 % of what the catalogue's sets share, and without its last set it would not.
+/// The 95 % set is the smallest possible: its sets have 95 % of the probability of all sets of the catalogue, and
+/// without its last set they would have less.
 fn assert_covering(told: &Diagnosis) {
     if told.ambiguous.is_empty() {
         return;
@@ -86,7 +88,7 @@ fn assert_covering(told: &Diagnosis) {
     assert!(told.named.iter().all(|name| told.ambiguous.contains(name)));
 }
 
-/// Shares are shares, intervals hold what they are of, and nothing is NaN.
+/// Shares are between 0 and 1, intervals contain their values, and no number is NaN.
 fn assert_numbers(told: &Diagnosis) {
     for c in &told.candidates {
         assert!(c.closed <= 1.0 && c.closed_ci[0] <= c.closed_ci[1], "{c:?}");
@@ -107,13 +109,14 @@ fn assert_numbers(told: &Diagnosis) {
     for p in &told.parameters {
         assert!(p.sigmas.abs() <= 3.0 + 1e-9, "three tolerances are all: {p:?}");
     }
-    // serde_json writes what is not finite as null, and so it does what is not there: all that is not optional is there.
+    // serde_json writes null for numbers that are not finite and for missing values. Therefore no key may be null,
+    // except the optional ones.
     let optional = ["unexplained", "proposed", "gross", "transfer", "next_experiment", "baselines"];
     let mut json = serde_json::to_value(told).expect("written");
     let object = json.as_object_mut().expect("an object");
     optional.iter().for_each(|key| drop(object.remove(*key)));
     object["identifiability"] = serde_json::Value::Null;
-    // errors of the recording have as many numbers as they have
+    // the number of values of an error depends on its kind
     object["answer"].as_object_mut().expect("an answer").remove("errors");
     let null = object.iter().find(|(key, value)| *key != "identifiability" && holds_null(value));
     assert_eq!(null, None);

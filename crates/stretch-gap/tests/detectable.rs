@@ -1,4 +1,4 @@
-//! Detection limits against what they promise: roots, twins, and the real diagnosis.
+//! Compares detection limits with scaling laws, with twins, and with diagnoses at the limits.
 
 use crate::toys::{Effect, Law, Toy};
 use stretch_gap::{DetectionLimit, Options, Thresholds};
@@ -19,9 +19,10 @@ fn limit(toy: &Toy, effect: Effect, thresholds: Thresholds) -> Option<f64> {
     own.unwrap_or_else(|| panic!("{effect:?}: {all:?}")).strength
 }
 
-/// If chance decides, and not the size from which a gap counts, four times the rows lower the limit by a factor between 4^(1/4) and 4^(1/2):
-/// scores count squares, which grow with the rows, and the share that closes is one of excesses, whose chance falls with their root. 200 draws
-/// determine each limit to about 4 %, so the ratio may be 8 % outside.
+/// If the limit is set by chance and not by the smallest gap that counts, four times as many rows lower it by a factor
+/// between 4^(1/4) and 4^(1/2). Scores are sums of squares, which grow with the number of rows. The closed share is a
+/// ratio of excesses, whose random error falls with the root of that number. 200 draws determine each limit to about 4
+/// %, so the ratio may be 8 % outside.
 #[test]
 fn the_limit_falls_with_the_rows() {
     let any =
@@ -36,7 +37,7 @@ fn the_limit_falls_with_the_rows() {
     }
 }
 
-/// A gap of less than `least_gap` of the noise's variance is none, however many rows show it.
+/// A gap of less than `least_gap`, in variances of the noise, does not count, however many rows show it.
 #[test]
 fn a_gap_that_does_not_count_is_not_named_however_long_the_record() {
     let of = |times: usize| {
@@ -48,7 +49,8 @@ fn a_gap_that_does_not_count_is_not_named_however_long_the_record() {
     assert!((0.9..1.15).contains(&ratio), "{ratio}");
 }
 
-/// The change of a quadratic is linear in its strength: twice the noise, twice the limit; the parameters' tolerances do not scale with the noise.
+/// The change by a quadratic is linear in its strength, so the limit is proportional to the noise, although the
+/// tolerances of the parameters do not scale with it.
 #[test]
 fn the_limit_scales_with_the_noise() {
     let of = |noise: f64| {
@@ -59,8 +61,8 @@ fn the_limit_scales_with_the_noise() {
     assert!((loud / quiet / 4.0 - 1.0).abs() < 0.02, "{quiet} {loud}");
 }
 
-/// Two names for one law: whichever is present, a coin decides, and neither is ever named nine
-/// times in ten. To distinguish a lag from a delay takes more than to detect one alone.
+/// If one law has two names, chance decides between them, so neither is ever named nine times in ten. Distinguishing a
+/// lag from a delay needs a stronger effect than detecting one of them alone.
 #[test]
 fn twins_have_larger_limits_than_one_alone() {
     let frozen = Thresholds::frozen();
@@ -73,8 +75,8 @@ fn twins_have_larger_limits_than_one_alone() {
     assert!(beside.is_none_or(|beside| beside > 1.2 * late), "{late} {beside:?}");
 }
 
-/// Ten recordings each with a third more than the limit, and with half of it, diagnosed as any recording is. A limit
-/// holds for the motion of its recording, so all recordings have the same motion and differ in their noise.
+/// Diagnoses ten recordings with 1.3 times the limit, ten with the limit and ten with half of it. A limit holds for the
+/// motion of its recording, so all recordings have the same motion and differ in their noise.
 #[test]
 fn what_is_above_its_limit_is_named_and_what_is_below_is_not() {
     let effects = [Effect::Play, Effect::Quadratic, Effect::Cubic, Effect::Drift];

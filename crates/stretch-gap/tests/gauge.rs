@@ -1,28 +1,29 @@
-//! A gauge with one stage, straight but for what it lacks.
+//! A gauge as a simulator with one stage: a straight line that lacks one effect.
 
 use stretch_gap::{
     Description, DescriptionSpec, EffectParameter, EffectSpec, GapError, MotionSpec, ParameterSpec,
     RandomGenerator, RecordFacts, Recorded, Run, Simulator, StageSpec, TrialSpec,
 };
 
-/// Samples of a trial, and their time, s.
+/// Number of samples of a trial, and sample time, s.
 const SAMPLES: usize = 4000;
 const DT_S: f64 = 0.01;
 /// Noise of the output, V.
 const NOISE_V: f64 = 0.002;
-/// Standard deviation of the time between a sample and its stamp, s: four times the noise where the rod moves half of its range a second.
+/// Standard deviation of the time between a sample and its stamp, s. It causes an error of four times the noise if the
+/// rod moves half of its range per second.
 pub(crate) const JITTER_S: f64 = 0.016;
 
-/// What the rig has and the simulator lacks.
+/// The effect that the recording contains and the simulator lacks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Lack {
     /// 0.1 V (x - play(x, 0.1)), x from 0 to 1.
     Play,
-    /// 0.01 V x |v|, v in half ranges a second.
+    /// 0.01 V x |v|, with v in half ranges per second.
     Product,
     /// 0.02 V lag(v^2, 2 s).
     Warming,
-    /// Two levels between which it switches on its own.
+    /// Random switching between two levels.
     Telegraph,
     /// A step at a different time in each trial.
     Jumps,
@@ -30,13 +31,13 @@ pub(crate) enum Lack {
     Curve,
     /// Nothing.
     Nothing,
-    /// White noise a third as large as the floor.
+    /// White noise of a third of the sensor noise.
     Whisper,
-    /// White noise above the floor.
+    /// White noise that is larger than the sensor noise.
     White,
     /// Time stamps that jitter by [`JITTER_S`].
     Jitter,
-    /// A random walk that returns.
+    /// Slow drift: an Ornstein-Uhlenbeck process.
     SlowDrift,
 }
 
@@ -44,7 +45,7 @@ pub(crate) enum Lack {
 #[derive(Debug, Clone)]
 pub(crate) struct Gauge {
     description: Description,
-    /// Units of the rod in a millimetre, of the output in a volt.
+    /// Number of units of the rod per millimetre, and of the output per volt.
     units: [f64; 2],
     rod_mm: Vec<f64>,
     volts: Vec<f64>,
@@ -86,7 +87,7 @@ impl Gauge {
         Self { description: description(specs, 1.0, &rod_mm), units: [1.0; 2], rod_mm, volts }
     }
 
-    /// The same with noise taken for so many times what it is.
+    /// The same gauge, whose stated noise is `times` the true noise.
     pub(crate) fn with_noise_taken_for(&self, times: f64) -> Self {
         let mut other = self.clone();
         let mut spec = (*self.description).clone();
@@ -97,7 +98,7 @@ impl Gauge {
         other
     }
 
-    /// The same in other units.
+    /// The same gauge in other units.
     pub(crate) fn scaled(&self, rod: f64, output: f64) -> Self {
         let rod_mm: Vec<f64> = self.rod_mm.iter().map(|x| rod * x).collect();
         Self {
@@ -108,7 +109,7 @@ impl Gauge {
         }
     }
 
-    /// The same with a test trial in which both columns are something else.
+    /// The same gauge with other values in both columns of the test trial.
     pub(crate) fn with_another_test_trial(&self) -> Self {
         let mut other = self.clone();
         let from = other.rod_mm.len() - SAMPLES;
@@ -174,7 +175,7 @@ fn extra(lack: Lack, x: &[f64], random: &mut RandomGenerator) -> Vec<f64> {
         Lack::Curve => 0.04 * x[i] * (1.0 - x[i]),
         Lack::Nothing => 0.0,
         Lack::Whisper => NOISE_V / 3.0 * random.gauss(),
-        // The rate is in half ranges a second.
+        // The rate is in half ranges per second.
         Lack::Jitter => GAIN * 0.5 * rate(i) * JITTER_S * random.gauss(),
         Lack::White => 0.01 * random.gauss(),
         Lack::SlowDrift => {

@@ -1,4 +1,5 @@
-//! What a diagnosis may not depend on: threads, order, units, the clock of the session, and what the test trials hold.
+//! Tests that a diagnosis does not depend on threads, order, units and the clock of the session, and that fits do not
+//! depend on the test trials.
 
 use crate::{
     consistent::{evidenced, told},
@@ -6,7 +7,7 @@ use crate::{
 };
 use stretch_gap::{Diagnosis, Options};
 
-/// A lag and a line with something wrong in both.
+/// A lag and a line, each with a missing effect.
 fn two_stages() -> Toy {
     let mut toy = Toy::of(&[Law::Lag, Law::Line]);
     toy.catalogue = (0..2)
@@ -37,7 +38,7 @@ fn the_same_question_has_the_same_answer() {
     assert_eq!(without_time(told(&measured)), without_time(told(&measured)));
 }
 
-/// The seed draws bootstraps alone: names, scores and sizes stay, intervals move a little.
+/// The seed affects only the bootstrap: names, scores and sizes are the same, and intervals change a little.
 #[test]
 fn the_seed_moves_intervals_alone() {
     let by = |seed: u64| {
@@ -51,8 +52,8 @@ fn the_seed_moves_intervals_alone() {
     }
 }
 
-/// Effects in another order are the same effects. Fits of sets begin with another member and end within their tolerance of the same optimum: scores
-/// to a hundredth of a nat, sizes to a thousandth.
+/// The order of the catalogue does not matter. Fits of sets begin with a different effect, but end near the same
+/// optimum: scores agree to a hundredth of a nat, sizes to a thousandth.
 #[test]
 fn the_order_of_the_catalogue_does_not_matter() {
     let (one, mut turned) = (two_stages(), two_stages());
@@ -72,7 +73,8 @@ fn the_order_of_the_catalogue_does_not_matter() {
     }
 }
 
-/// Kilometres and microvolts: everything that is counted in noise is the same but for roundings of searches that stop where steps are small.
+/// With other units (kilometres, microvolts), every result in multiples of the noise is the same, except for rounding,
+/// because searches stop when their steps are small.
 #[test]
 fn units_do_not_matter() {
     let (plain, scaled) = (two_stages(), Toy { units: [1e-3, 1e6], ..two_stages() });
@@ -95,7 +97,8 @@ fn units_do_not_matter() {
     }
 }
 
-/// A session that began an hour later: clocks count from its first trial, but for a drift, whose offset the line's own takes up.
+/// A session that began an hour later has the same diagnosis, because clocks count from its first trial. Only a drift
+/// counts from the clock's zero; the zero of the line absorbs this offset.
 #[test]
 fn the_hour_of_the_session_does_not_matter() {
     let later = Toy { begins_s: 3600.0, ..two_stages() };
@@ -107,7 +110,7 @@ fn the_hour_of_the_session_does_not_matter() {
     }
 }
 
-/// The same recording twice, the second with something else in its last trial, the one that is tested on.
+/// Returns a recording, and the same recording with other values in its test trial (the last one).
 fn with_another_test(seed: u64) -> (Measured, Measured) {
     let plain = two_stages().measured(seed);
     let other = two_stages().measured(seed).rewritten(|x, outputs| {
@@ -136,7 +139,7 @@ fn test_trials_are_never_fitted() {
     assert_eq!(of_one.retuned_sd, of_two.retuned_sd);
     assert_eq!(one.identifiability, two.identifiability);
     for a in &one.candidates {
-        // A set that is worse on these test trials than nothing is no candidate.
+        // A set that is worse than the empty set on these test trials is not a candidate.
         let Some(b) = two.candidates.iter().find(|b| b.effects == a.effects) else { continue };
         assert_eq!((&a.by_name, &a.parameters), (&b.by_name, &b.parameters));
         assert!(a.effects == ["unknown"] || a.score == b.score);
@@ -149,14 +152,13 @@ fn test_trials_are_never_fitted() {
     }
 }
 
-/// A proposal that is worse on the test trials than none closes no share of them, and is not
-/// reported as if it did.
+/// A proposed sum of terms that makes the test trials worse is not reported.
 #[test]
 fn a_proposal_that_fails_on_the_test_trials_is_not_told() {
     told(&with_another_test(7).1);
 }
 
-/// Without a test trial the last quarter of every trial is held back: nothing there moves a fit either.
+/// Without a test trial, the last quarter of every trial is used for testing. Its values do not affect a fit either.
 #[test]
 fn borrowed_test_samples_are_never_fitted() {
     let mut toy = Toy::of(&[Law::Lag]).may_lack(&[Effect::Play, Effect::Cubic]);
@@ -175,7 +177,7 @@ fn borrowed_test_samples_are_never_fitted() {
     assert!(two.gap.left > one.gap.left);
 }
 
-/// A session with a test trial in its middle: test samples are not used, wherever they are.
+/// A test trial in the middle of a session is not fitted either.
 #[test]
 fn a_test_trial_in_the_middle_is_not_fitted() {
     let mut toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Play, Effect::Quadratic]);

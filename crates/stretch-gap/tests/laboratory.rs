@@ -1,4 +1,5 @@
-//! What to measure next: rivals that tie on what was measured are parted by the experiment that moves them apart.
+//! Tests the proposal of the next experiment: two effects are a tie on the recorded motion, and the proposed motion
+//! distinguishes them.
 
 use crate::{
     consistent::evidenced,
@@ -6,7 +7,7 @@ use crate::{
 };
 use stretch_gap::{Diagnosis, Evidence, Model, Options, differences, next_experiment};
 
-/// A line with a cubic, held at three levels: a square with another gain does as well.
+/// A line with a cubic, held at three levels. On these levels, a square with another gain explains the same.
 fn tied() -> (Measured, Diagnosis, Evidence) {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Cubic]);
     let toy = toy.hiding(&[(Effect::Cubic, &[0.1])]);
@@ -26,7 +27,7 @@ fn what_was_measured_cannot_tell_and_the_next_experiment_can() {
     let mut separates = proposal.next.separates.clone();
     separates.sort();
     assert_eq!(separates, ["cubic", "quadratic"]);
-    // From -1 on x^2 and x^3 go apart; at the three levels again they do not.
+    // x^2 and x^3 differ if x is also negative. On the three levels they do not differ.
     assert_eq!(proposal.next.name, "to both sides");
     let d =
         |name: &str| proposal.experiments.iter().find(|m| m.0 == name).map_or(f64::NAN, |m| m.1);
@@ -67,14 +68,13 @@ fn a_single_name_needs_no_experiment() {
     let (told, evidence) = evidenced(&measured, &Options::default());
     assert_eq!(told.ambiguous, ["cubic"], "{}", told.sentence);
     assert_eq!(next_experiment(&measured, &told, &evidence).expect("simulated"), None);
-    // So does a recording without a gap.
+    // A recording without a gap needs no experiment either.
     let quiet = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]).measured(3);
     let (told, evidence) = evidenced(&quiet, &Options::default());
     assert_eq!(next_experiment(&quiet, &told, &evidence).expect("simulated"), None);
 }
 
-/// It is unknown which hypothesis is true: both are assumed, and their order does not matter. A
-/// model does not differ from itself.
+/// Either hypothesis may be true, so their order does not matter. A model does not differ from itself.
 #[test]
 fn differences_have_no_order() {
     let (measured, _, _) = tied();

@@ -6,8 +6,8 @@ use crate::{
 };
 use stretch_gap::{Diagnosis, Options, RandomGenerator};
 
-/// A line and a bench whose offset jumps by noise wherever `is_there` says so of sample, motion and
-/// rate. No parameter can follow that.
+/// A line whose recording has additional white noise of the offset at the samples for which `is_there` (of sample,
+/// motion and rate) is true. No parameter can explain this noise.
 fn disturbed(seed: u64, sd: f64, is_there: impl Fn(usize, f64, f64) -> bool) -> Measured {
     let toy =
         Toy { trials: vec![(1500, false), (1500, false), (1500, true)], ..Toy::of(&[Law::Line]) };
@@ -41,19 +41,22 @@ fn a_gap_at_high_level_stands_out_there() {
     let levels: Vec<&str> =
         told.location.slices.iter().filter(|s| s.by == "level").map(|s| s.slice.as_str()).collect();
     let out = standing_out(&told, "level");
-    // Of five levels between -1 and 1 the highest begins at some 0.5: it holds most of the gap, the one before the rest.
+    // The highest of five levels between -1 and 1 begins at about 0.5. It contains most of the gap, and the level below
+    // it the rest.
     assert_eq!(levels.len(), 5);
     assert!(out.contains(&levels[4]) && !out.iter().any(|o| levels[..3].contains(o)), "{out:?}");
     let high = told.location.slices.iter().filter(|s| levels[3..].contains(&s.slice.as_str()));
     let share: f64 = high.map(|s| s.share).sum();
-    // Nine variances in some tenth of 4500 samples are 4000; each of the other three levels has some 1200 samples, whose noise leaves
-    // sqrt(2 1200) = 49: three of these from each are a tenth.
+    // The gap is nine variances in about a tenth of 4500 samples, a sum of 4000. Each of the three lower levels has
+    // about 1200 samples, whose sum of squares has the standard deviation sqrt(2 1200) = 49. Three of these for each
+    // level are a tenth of the gap.
     assert!(share > 0.9, "{share}");
 }
 
 #[test]
 fn a_gap_at_turnarounds_stands_out_there() {
-    // Where it is slow it turns: within 150 ms of a reversal rates are below some 0.15 of a wave of 2 rad/s and more.
+    // Low rates occur near reversals: within 150 ms of a reversal, a wave of 2 rad/s or more has rates below about
+    // 0.15.
     let told = told(&disturbed(2, 0.03, |_, _, rate| rate.abs() < 0.05));
     assert_eq!(standing_out(&told, "regime"), ["turnaround"]);
     let moving = told.location.slices.iter().find(|s| s.by == "regime" && s.slice == "rising");
@@ -64,7 +67,8 @@ fn a_gap_at_turnarounds_stands_out_there() {
 fn a_gap_of_one_trial_stands_out_in_its_trial() {
     let told = told(&disturbed(3, 0.01, |i, _, _| (1500..3000).contains(&i)));
     assert_eq!(standing_out(&told, "trial"), ["trial 1"]);
-    // Session and travel are other clocks of the same; of motion, time within a trial and frequency it knows nothing.
+    // Session time and travel vary with the trial, so slices on these axes may be significant as well. The gap is
+    // independent of motion, time in the trial and frequency.
     assert_eq!(elsewhere(&told, &["trial", "session", "travel"]), []);
 }
 
@@ -85,14 +89,15 @@ fn a_gap_of_one_octave_stands_out_there() {
     let told = told(&toy.measured(5));
     assert_eq!(standing_out(&told, "frequency"), ["12.5 to 25 Hz"]);
     let slice = told.location.slices.iter().find(|s| s.slice == "12.5 to 25 Hz");
-    // Half a squared amplitude over the noise's variance, 0.5, all in a quarter of the lines: an excess of 2.
+    // The power of the hum is half of its squared amplitude, 0.5 variances of the noise. It lies in a quarter of the
+    // spectral lines, so the excess there is 2.
     let excess = slice.map_or(0.0, |s| s.excess);
     assert!((excess - 2.0).abs() < 0.4, "{excess}");
     assert_eq!(elsewhere(&told, &["frequency"]), []);
 }
 
-/// If nothing is wrong a slice is significant in at most 5 of 100 recordings (dependent slices make it fewer): over 60
-/// no more than a binomial count exceeds once in a thousand.
+/// If nothing is wrong, a slice is significant in at most 5 % of the recordings (in fewer, because slices depend on
+/// each other). Of 60 recordings, the test allows the number that a binomial count exceeds once in a thousand.
 #[test]
 fn nothing_stands_out_of_noise() {
     let alarms = (0..60)
@@ -105,7 +110,7 @@ fn nothing_stands_out_of_noise() {
     assert!(alarms <= binomial_bound(60, 0.05, 0.001), "{alarms} of 60");
 }
 
-/// Along each axis that cuts all samples the shares sum to the whole.
+/// On each axis that divides all samples, the shares of the slices sum to 1.
 #[test]
 fn shares_of_slices_sum_to_the_gap() {
     let told = told(&disturbed(6, 0.03, |_, x, _| x > 0.3));
@@ -140,29 +145,31 @@ fn a_gap_has_the_stage_that_makes_it() {
         assert!(gaps[wrong] > 4.0 && gaps[other] < 0.2, "{gaps:?}");
         assert!((ends[0] + ends[1] - 1.0).abs() < 1e-9, "{ends:?}");
         let expected = (1.0 + gaps[0]) / (1.0 + gaps[0] + gaps[1]);
-        // Noise and gap are independent: their product over 1000 tested samples is 2 sqrt(e/1000) of a variance, 0.03 of the whole; two of these.
+        // Noise and gap are independent. The mean of twice their product over 1000 tested samples has the standard
+        // deviation 2 sqrt(e/1000) variances, which is 0.03 of the whole. The tolerance is two of these.
         assert!((ends[0] - expected).abs() < 0.06, "{wrong}: {ends:?} for {expected}");
     }
 }
 
-/// Where nothing is wrong all that is missing from end to end is the noise that drives the line.
+/// If nothing is wrong, the chain lacks only the noise that drives the line.
 #[test]
 fn noise_that_drives_a_stage_is_that_of_the_stage_before() {
     let (gaps, ends) = end_to_end(0, 0.0);
     assert!(gaps.iter().all(|e| *e < 0.2), "{gaps:?}");
-    // The product of two noises over 1000 samples is 2/sqrt(1000) = 0.06 of a variance, plus that
-    // of a mean square, 0.045: three of these.
+    // Over 1000 samples, twice the product of two noises has the standard deviation 2/sqrt(1000) = 0.06 variances, and
+    // a mean square 0.045. The tolerance is three of these.
     assert!(ends[0] > 0.8, "{ends:?}");
 }
 
-/// What a named effect leaves is noise wherever one looks; before, the gap of a cubic is at the ends of the range.
+/// After the named effect is removed, only noise is left. Without it, a cubic leaves a gap at the ends of the range.
 #[test]
 fn the_residual_after_a_named_effect_is_noise() {
     let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(Effect::Cubic, &[0.4])]);
     let (told, evidence) = evidenced(&toy.measured(9), &Options::default());
     assert_eq!(told.named, ["cubic"]);
     let stage = &evidence.stages[0];
-    // 1000 tested samples: a mean square is known to sqrt(2/1000) = 0.045; four of these.
+    // The mean square of 1000 tested samples has the standard deviation sqrt(2/1000) = 0.045. The tolerance is four of
+    // these.
     assert!(
         stage.excess_after.abs() < 0.18 && stage.excess_retuned > 1.0,
         "{}",

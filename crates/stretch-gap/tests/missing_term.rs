@@ -1,4 +1,5 @@
-//! A gauge that lacks something that no catalogue holds: is it found again, and is what is random called so?
+//! Tests whether a term that no catalogue contains is found again for a gauge, and whether random residuals are called
+//! random.
 
 use crate::gauge::{Gauge, JITTER_S, Lack, RANGE_MM};
 use approx::assert_relative_eq;
@@ -22,7 +23,7 @@ fn a_planted_play_is_found_again() {
     else {
         panic!("{}", found.equation)
     };
-    // 0.1 V a range of the rod, of half-width 0.1 of it; the signal's scale is the range that was fitted.
+    // The term has 0.1 V per range of the rod and a half-width of 0.1 ranges. The proposal's scale is the fitted range.
     let range = scale / RANGE_MM;
     assert_relative_eq!(width * range, 0.1, epsilon = 0.0, max_relative = PLANTED_TERM);
     assert_relative_eq!(first.coefficient, 0.1 * range, epsilon = 0.0, max_relative = PLANTED_TERM);
@@ -37,7 +38,7 @@ fn planted_warming_is_found_again() {
     assert_eq!(first.form.factors, [Factor::Rate { signal: 0, form: RateForm::Square }]);
     let Passage::Lag { tau_s } = first.form.passage else { panic!("{}", found.equation) };
     assert_relative_eq!(tau_s, 2.0, epsilon = 0.0, max_relative = PLANTED_TERM);
-    // 0.02 V at half a range a second.
+    // 0.02 V at a rate of half a range per second.
     let rate = found.signals[0].rate_per_s * found.signals[0].scale / RANGE_MM;
     let expected = 0.02 * (rate / 0.5).powi(2);
     assert_relative_eq!(first.coefficient, expected, epsilon = 0.0, max_relative = PLANTED_TERM);
@@ -65,13 +66,14 @@ fn time_stamps_that_jitter_are_told_with_their_size() {
         let Some(Course::Jitters { sd_s }) = found.course else {
             panic!("{seed}: {:?}", found.course)
         };
-        // Some thousands of samples tell a variance to a twentieth.
+        // Some thousands of samples determine a variance to 5 %.
         assert!((sd_s / JITTER_S - 1.0).abs() < 0.1, "{seed}: {sd_s} s");
         assert!(found.sentence.contains("time stamps jitter by about"), "{}", found.sentence);
     }
 }
 
-/// Metres and millivolts in place of millimetres and volts: the same terms, coefficients in the other unit.
+/// In metres and millivolts instead of millimetres and volts, the same terms are proposed, with coefficients in the
+/// other unit.
 #[test]
 fn terms_do_not_depend_on_units() {
     let plain = Gauge::lacking(Lack::Product, 3);
@@ -88,7 +90,7 @@ fn terms_do_not_depend_on_units() {
     }
 }
 
-/// Whatever the test trial holds, the same is proposed; only the share that closes there is another.
+/// Other values in the test trial change only the share that the proposal closes there.
 #[test]
 fn nothing_is_chosen_or_fitted_by_test_samples() {
     let plain = Gauge::lacking(Lack::Product, 4);

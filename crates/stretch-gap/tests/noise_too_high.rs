@@ -1,4 +1,5 @@
-//! Noise that is taken too high hides no effect: what the effect leaves is the noise.
+//! If the noise is assumed too large, no effect is hidden, because the residual of the best set of effects replaces the
+//! assumed noise.
 
 use crate::gauge::{Gauge, Lack};
 use stretch_gap::{Diagnosis, Options, VerdictKind, diagnose};
@@ -16,13 +17,13 @@ fn an_effect_below_noise_taken_too_high_is_named() {
             assert_eq!(found.verdict, VerdictKind::Effect, "{}", found.sentence);
             assert_eq!(found.named, ["curve"]);
         }
-        // Whatever the noise was taken for, the gap is the same in units of what is left: sets chosen alike differ by noise alone.
+        // The gap is relative to the residual of the best set, so it does not depend on the assumed noise.
         let [right, high] = found.map(|found| found.gap.retuned);
         assert!((0.9..1.1).contains(&(high / right)), "{high} {right}");
     }
 }
 
-/// The rule gives nothing away where nothing is missing.
+/// If nothing is missing, no effect is named.
 #[test]
 fn nothing_is_named_below_noise_taken_too_high() {
     for seed in 0..20 {

@@ -1,5 +1,5 @@
-//! Records in which nothing is missing stay within the band of noise, and a gap above it without a
-//! name is reported as such.
+//! The gap of recordings in which nothing is missing stays within the null band. A gap above the
+//! band that no effect explains is reported.
 
 use crate::gauge::{Gauge, Lack};
 use stretch_gap::{Diagnosis, Options, VerdictKind, diagnose};
@@ -9,7 +9,8 @@ fn diagnosed(lack: Lack, seed: u64) -> Diagnosis {
     diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0
 }
 
-/// Of 40 recordings two lie outside a band of 19 in 20; seven or more with probability 0.003.
+/// On average, two of 40 recordings are outside a 95 % band; seven or more are outside with
+/// probability 0.003.
 #[test]
 fn noise_stays_within_its_band() {
     let is_outside = |seed: &u64| {

@@ -1,4 +1,4 @@
-//! What names are worth: ties, probabilities, and shares of the gap against their analytic values.
+//! Tests ties, probabilities, and shares of the gap against analytic values.
 
 use crate::{
     consistent::{evidenced, told},
@@ -6,7 +6,7 @@ use crate::{
 };
 use stretch_gap::{Diagnosis, Options, RandomGenerator, VerdictKind};
 
-/// A line whose parameters are exact: what a bench adds is all of the gap.
+/// A line with exact parameters, so that the whole gap comes from what the recording contains in addition.
 fn exact() -> Toy {
     let mut toy = Toy::of(&[Law::Line]);
     toy.parameters.iter_mut().for_each(|p| p.sd = 0.0);
@@ -30,7 +30,7 @@ fn exact_twins_are_a_tie() {
         told.sentence
     );
     let [one, two] = [0, 1].map(|i| told.candidates[i].probability);
-    // The two fits end where their steps are small: scores agree to hundredths of a nat, the temperature is 5.
+    // Both fits end when their steps are small, so their scores agree to hundredths of a nat. The temperature is 5.
     assert!((one / two - 1.0).abs() < 0.01, "{one} {two}");
     both.sort();
     let mut ambiguous = told.ambiguous.clone();
@@ -38,7 +38,8 @@ fn exact_twins_are_a_tie() {
     assert_eq!(ambiguous, both);
 }
 
-/// A twin that is not in the catalogue takes nothing from the name, and one that is no twin is no tie.
+/// If the twin is not in the catalogue, the effect is named without a tie. Effects that can be distinguished are no
+/// tie.
 #[test]
 fn what_is_told_apart_is_no_tie() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Cubic, Effect::Play]);
@@ -48,8 +49,8 @@ fn what_is_told_apart_is_no_tie() {
     assert!(told.candidates[0].probability > 0.9, "{}", told.candidates[0].probability);
 }
 
-/// A known cause c x^2 plus noise of a known size e in the offset that nothing closes: 1 - e^2/(e^2 +
-/// mean of (c x^2)^2).
+/// Returns the diagnosis of a recording with a known cause c x^2 and with noise of the offset, of standard deviation e,
+/// that no effect explains; and the true closed share 1 - e^2/(e^2 + mean of (c x^2)^2).
 fn half_closed(seed: u64) -> (Diagnosis, f64) {
     let (c, e) = (0.1, 0.012);
     let toy = exact().may_lack(&[Effect::Quadratic]).hiding(&[(Effect::Quadratic, &[c])]);
@@ -62,7 +63,8 @@ fn half_closed(seed: u64) -> (Diagnosis, f64) {
     (told(&measured), 1.0 - e * e / (e * e + own))
 }
 
-/// The gap before is known to some 5 % of itself, noise alone; the share, in which both gaps hold the same noise, to 0.05.
+/// Because of noise, the gap is known to about 5 %. The closed share is known to 0.05, because both gaps contain the
+/// same noise.
 #[test]
 fn the_share_closed_is_the_analytic_one() {
     let (told, truth) = half_closed(2);
@@ -72,8 +74,9 @@ fn the_share_closed_is_the_analytic_one() {
     assert!((found.closed - truth).abs() < 0.15, "{} for {truth}", found.closed);
 }
 
-/// Twenty blocks of 0.5 s are few: percentiles of 20 hold some 90 %. Of 60 recordings no fewer are held than a binomial
-/// count of 0.1 misses once in a thousand.
+/// Twenty blocks of 0.5 s are few: their percentile intervals contain the true share in about 90 % of the recordings.
+/// Of 60 recordings, the test allows the number of misses that a binomial count of probability 0.1 exceeds once in a
+/// thousand.
 #[test]
 fn intervals_of_the_share_hold_it_over_seeds() {
     let missed = (0..60)
@@ -86,16 +89,17 @@ fn intervals_of_the_share_hold_it_over_seeds() {
     assert!(missed <= binomial_bound(60, 0.1, 0.001), "{missed} of 60");
 }
 
-/// Everything is closed where the effect is the only cause: whatever its size.
+/// If the effect is the only cause, it closes the whole gap, whatever its size.
 #[test]
 fn the_only_cause_closes_all() {
     for size in [0.02, 0.1, 0.4] {
         let toy = exact().may_lack(&[Effect::Quadratic]).hiding(&[(Effect::Quadratic, &[size])]);
         let told = told(&toy.measured(3));
         let (found, gap) = (&told.candidates[0], told.candidates[0].gap_before);
-        // What chance leaves, sqrt(2/1000) of one noise, three times, over the gap.
+        // The mean square of the noise has the standard deviation sqrt(2/1000). The tolerance is three of these, as a
+        // share of the gap.
         assert!(found.closed > 1.0 - 0.14 / gap, "{size}: {} of {gap}", found.closed);
-        // Mean of (c x^2)^2 over the noise: four tones of a quarter have a mean x^4 of 3/4 0.125^2 4 (1 - 3/16 ...), measured here.
+        // The gap is the mean of (c x^2)^2 in variances of the noise; it is computed from the recorded x.
         let x = toy_x(3);
         let own = x[3000..].iter().map(|x| (size * x * x).powi(2)).sum::<f64>() / 1000.0 / 1e-4;
         assert!((gap / own - 1.0).abs() < 0.05 + 0.14 / own, "{size}: {gap} for {own}");
@@ -106,7 +110,7 @@ fn toy_x(seed: u64) -> Vec<f64> {
     exact().measured(seed).x
 }
 
-/// Taken apart from the weakest to the strongest, shares telescope to what the whole set closes.
+/// Effects are removed from the weakest to the strongest, so their shares sum to the share that the whole set closes.
 #[test]
 fn shares_of_effects_sum_to_what_the_set_closes() {
     let pairs: [[(Effect, &[f64]); 2]; 2] = [
@@ -118,20 +122,21 @@ fn shares_of_effects_sum_to_what_the_set_closes() {
         let told = told(&toy.measured(seed));
         let first = &told.candidates[0];
         let sum: f64 = told.shares.iter().map(|s| s.closes).sum();
-        // Both count gaps from what the best set leaves, once cut at the noise and once not: the chance part of one noise over the gap.
+        // Both sums are relative to what the best set leaves, but only one of them is limited to values above the
+        // noise. They differ by the random error of the noise, as a share of the gap.
         assert!(
             (sum - first.closed).abs() < 0.2 / first.gap_before.min(1e3) + 1e-9,
             "{sum} {}",
             first.closed
         );
         assert!(told.shares.iter().all(|s| !s.at_bound && s.closes > 0.0), "{:?}", told.shares);
-        // Of the stages the one where an effect closes most closes no less than their mean.
+        // In the stage in which an effect closes most, it closes at least the mean over the stages.
         let least = |closes: f64| closes * first.gap_before / told.location.stages.len() as f64;
         assert!(told.shares.iter().all(|s| s.closes_excess >= 0.9 * least(s.closes)));
     }
 }
 
-/// A certain effect that closes almost nothing is not named with one that closes all.
+/// An effect that is certain but closes almost nothing is not named together with an effect that closes nearly all.
 #[test]
 fn what_closes_nothing_stands_below() {
     let mut toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
@@ -145,9 +150,9 @@ fn what_closes_nothing_stands_below() {
     }
 }
 
-/// A size is reported with an interval that holds it: over 40 recordings at least as often as a binomial count of 0.05
-/// misses allows once in a thousand. (A block of fifty samples counts as one observation, although here all are:
-/// intervals are wide, and none may be missed by much.)
+/// The interval of an estimated size contains the true size. Of 40 recordings, the test allows the number of misses
+/// that a binomial count of probability 0.05 exceeds once in a thousand. (Intervals are wide here, because a block of
+/// fifty samples counts as one observation although all samples are independent.)
 #[test]
 fn intervals_of_a_size_hold_it_over_seeds() {
     let missed = (0..40)
@@ -164,7 +169,7 @@ fn intervals_of_a_size_hold_it_over_seeds() {
     assert!(missed <= binomial_bound(40, 0.05, 0.001), "{missed} of 40");
 }
 
-/// The fainter, the less is said: the probability of the name does not fall as the effect grows, and at a hundredth of the noise there is none.
+/// A strong effect is named, and an effect of a hundredth of the noise is not. The gap grows with the effect.
 #[test]
 fn a_name_grows_with_its_effect() {
     let told = |size: f64| {

@@ -1,4 +1,5 @@
-//! A line whose offset follows a law outside every catalogue: the law is proposed, noise is not.
+//! The offset of a line is a function of the motion that is in no catalogue. This function is proposed; for noise,
+//! nothing is proposed.
 
 use crate::{
     consistent::told,
@@ -6,11 +7,11 @@ use crate::{
 };
 use stretch_gap::{Factor, Passage, Proposed, RandomGenerator, RateForm, VerdictKind};
 
-/// Samples of a trial: 29 s.
+/// Number of samples of a trial: 29 s.
 const SAMPLES: usize = 2900;
 
-/// A line without effects, and a bench whose offset is a function of the motion, trial by trial, on
-/// the scale of terms: 0 to 1 over the fitted part.
+/// Returns the proposal and the verdict for a line without effects whose offset is a function of the motion. `law`
+/// computes the offset of a trial from its motion, scaled as in terms: 0 to 1 over the fitted trials.
 fn with_offset(seed: u64, law: impl Fn(&[f64]) -> Vec<f64>) -> (Option<Proposed>, VerdictKind) {
     let toy = short_trials();
     let x = toy.measured(seed).x;
@@ -23,14 +24,14 @@ fn with_offset(seed: u64, law: impl Fn(&[f64]) -> Vec<f64>) -> (Option<Proposed>
     (told.proposed, told.verdict)
 }
 
-/// Trials of less than 30 s are fitted whole: signals have the scale of all of them.
+/// Trials of less than 30 s are fitted completely, so signals are scaled by the range over all fitted trials.
 fn short_trials() -> Toy {
     let mut trials = vec![(SAMPLES, false); 3];
     trials.push((SAMPLES, true));
     Toy { trials, ..Toy::of(&[Law::Line]) }
 }
 
-/// What is proposed for a law of noises' size; everything but a twentieth of the gap is closed by it on trials that were not fitted.
+/// Returns the proposal for a law. It must close 95 % of the gap on trials that were not fitted.
 fn found(seed: u64, law: impl Fn(&[f64]) -> Vec<f64>) -> Proposed {
     let (proposed, verdict) = with_offset(seed, law);
     assert_eq!(verdict, VerdictKind::Unknown);
@@ -44,16 +45,16 @@ fn is_near(found: f64, expected: f64) -> bool {
     (found / expected - 1.0).abs() < testkit::tolerance::PLANTED_TERM
 }
 
-/// A square about the end of the range is one term. Gain and offset of the simulator may take a part of it, at the
-/// price of their tolerances. In one recording of ten they take so much that a knee in the middle of the range explains
-/// the rest as well.
+/// A square about the end of the range is one term. Gain and offset of the simulator may absorb a part of it within
+/// their tolerances. In one recording of ten they absorb so much that a knee in the middle of the range explains the
+/// rest as well.
 #[test]
 fn a_square_is_proposed_as_a_square() {
     let other = |seed: u64| {
         let proposed = found(seed, |x| x.iter().map(|x| 0.3 * x * x).collect());
         let [term] = &proposed.terms[..] else { panic!("{}", proposed.equation) };
         assert_eq!(term.form.passage, Passage::Direct, "{}", proposed.equation);
-        // A knee as near to the end of the range as shapes are refined is the same.
+        // A knee very near the end of the range is equivalent.
         let is_square = match term.form.factors[..] {
             [Factor::Power { signal: 0, power }] => power == 2.0,
             [Factor::Above { signal: 0, at, power }] => power == 2.0 && at < 0.002,
@@ -66,10 +67,10 @@ fn a_square_is_proposed_as_a_square() {
     assert!(others.len() <= 1, "{others:?}");
 }
 
-/// A spring that stiffens on either side of where it is slack is one term, not a sine and a memory.
+/// A cubic about zero (a spring that stiffens to both sides) is proposed as one term, not as a sine and a memory.
 #[test]
 fn a_cubic_about_zero_is_proposed_as_one_term() {
-    // Where the motion of this toy is zero, on the scale of terms.
+    // Scaled value of the signal at a motion of zero.
     const ZERO: f64 = 0.465;
     for seed in 1..=3 {
         let proposed = found(seed, |x| x.iter().map(|x| 2.0 * (x - ZERO).powi(3)).collect());
@@ -93,7 +94,7 @@ fn a_sine_is_proposed_with_its_turns() {
     assert!(is_near(turns, 2.0) && is_near(term.coefficient, 0.05), "{}", proposed.equation);
 }
 
-/// Backlash is a memory: of a play of half-width 0.1, a fifth arrives.
+/// Backlash is a term with memory: a fifth of a play of half-width 0.1 is added.
 #[test]
 fn a_memory_is_proposed_with_its_width() {
     let proposed = found(3, |x| {
@@ -114,7 +115,7 @@ fn a_memory_is_proposed_with_its_width() {
     );
 }
 
-/// The level times the size of the rate. The proposal's own rate is of root mean square 1.
+/// The level times the absolute rate. The scaled rate of the proposal has a root mean square of 1.
 #[test]
 fn a_product_with_the_rate_is_proposed() {
     let proposed = found(4, |x| {
@@ -128,7 +129,7 @@ fn a_product_with_the_rate_is_proposed() {
     let power = Factor::Power { signal: 0, power: 1.0 };
     let rate = Factor::Rate { signal: 0, form: RateForm::Magnitude };
     assert_eq!(term.form.factors, [power, rate], "{}", proposed.equation);
-    // A lag of a tenth of a sample is none.
+    // A lag of a tenth of a sample counts as none.
     let is_direct = match term.form.passage {
         Passage::Direct => true,
         Passage::Lag { tau_s } => tau_s < 0.002,
@@ -139,8 +140,8 @@ fn a_product_with_the_rate_is_proposed() {
     assert!(is_near(term.coefficient, expected), "{expected}: {}", proposed.equation);
 }
 
-/// Additional white or slow noise, a few times that of the record: a function of nothing. None of 12 recordings gets a
-/// term.
+/// Additional white or slow noise, a few times as large as that of the recording, is a function of no signal. In 12
+/// recordings no term is proposed.
 #[test]
 fn nothing_is_proposed_for_noise() {
     for seed in 0..12 {
@@ -162,8 +163,8 @@ fn nothing_is_proposed_for_noise() {
     }
 }
 
-/// A sum of thirty waves of the motion with phases of their own is a function, and not a short sum: it is not called random, and no three terms are said to
-/// close it unless they do.
+/// A sum of thirty waves of the motion with random phases is a function of the motion, but not a sum of few terms. It
+/// is not called random, and three terms are proposed only if they explain a part of it.
 #[test]
 fn a_function_of_many_terms_is_not_called_random() {
     let mut random = RandomGenerator::new(8, 0);
@@ -182,7 +183,7 @@ fn a_function_of_many_terms_is_not_called_random() {
     assert!(proposed.terms.is_empty() || proposed.closes_held > 0.1, "{proposed:?}");
 }
 
-/// What is proposed is no function of the test trial: a law that holds there alone is none.
+/// A law that holds only in the test trial is not proposed.
 #[test]
 fn what_the_test_trial_alone_has_is_not_proposed() {
     let toy = short_trials();
@@ -198,7 +199,7 @@ fn what_the_test_trial_alone_has_is_not_proposed() {
     assert!(told.proposed.is_none_or(|p| p.terms.is_empty()));
 }
 
-/// If an effect of the catalogue is present no term is proposed in addition to it or instead of it.
+/// If an effect of the catalogue explains the gap, no term is proposed.
 #[test]
 fn a_name_needs_no_proposal() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]);

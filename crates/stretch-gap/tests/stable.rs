@@ -11,7 +11,7 @@ fn stability(told: &Diagnosis, effect: &str) -> f64 {
     of.unwrap_or_else(|| panic!("{effect}: {:?}", told.stabilities)).stability
 }
 
-/// A play that every trial shows is the cause in every resampled record.
+/// A play that is visible in every trial is the cause in every resampled recording.
 #[test]
 fn what_every_trial_shows_is_firm() {
     let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
@@ -21,7 +21,8 @@ fn what_every_trial_shows_is_firm() {
     assert!(told.stabilities.iter().all(|s| (0.0..=1.0).contains(&s.stability)));
 }
 
-/// The same law under two names: a resampled recording cannot tell them apart either, and each has a half.
+/// If one law has two names, resampled recordings cannot distinguish them either, so each name has a stability of one
+/// half.
 #[test]
 fn each_of_two_twins_has_a_half() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Square, Effect::Drift]);
@@ -32,8 +33,7 @@ fn each_of_two_twins_has_a_half() {
     }
 }
 
-/// A quadratic and a cubic together: the strong one is in every set, one that chance could have
-/// caused is in fewer.
+/// Of a quadratic and a cubic together, the stronger effect is at least as stable as the weaker one.
 #[test]
 fn of_two_causes_the_stronger_is_the_firmer() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Cubic, Effect::Drift]);

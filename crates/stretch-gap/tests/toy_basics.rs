@@ -1,9 +1,9 @@
-//! The toys do what they say: what is hidden is named, and nothing where nothing is.
+//! Tests of the toys: hidden effects are named, and nothing is named if nothing is hidden.
 
 use crate::toys::{Effect, Law, Toy, binomial_bound, slow};
 use stretch_gap::VerdictKind;
 
-/// One of each kind, alone and one after the other.
+/// One toy for each law, and a chain of two.
 fn kinds() -> Vec<Toy> {
     let alone = [Law::Line, Law::Lag, Law::Oscillator, Law::Delay].map(|law| Toy::of(&[law]));
     alone.into_iter().chain([Toy::of(&[Law::Lag, Law::Line])]).collect()
@@ -13,7 +13,8 @@ fn kinds() -> Vec<Toy> {
 fn a_toy_agrees_with_its_own_bench() {
     for toy in kinds() {
         let (told, _) = toy.clone().may_lack(&Effect::ALL).measured(1).diagnosed();
-        // A test trial of 1000 samples leaves chance of sqrt(2/1000), which may pass what counts as a gap.
+        // With a test trial of 1000 samples, noise alone leaves an excess of about sqrt(2/1000), which may exceed the
+        // smallest gap that counts.
         let is_quiet = matches!(told.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
         assert!(is_quiet && told.named.is_empty(), "{:?}: {}", toy.laws, told.sentence);
     }
@@ -32,7 +33,8 @@ fn what_a_toy_hides_is_named() {
     }
 }
 
-/// Of a fair coin thrown ten times more than eight heads come with probability 11/1024, more than seven with 56/1024.
+/// Ten throws of a fair coin give more than eight heads with probability 11/1024, and more than seven with probability
+/// 56/1024.
 #[test]
 fn a_bound_of_a_count_is_the_binomial_quantile() {
     assert_eq!(binomial_bound(10, 0.5, 0.011), 8);
@@ -40,8 +42,8 @@ fn a_bound_of_a_count_is_the_binomial_quantile() {
     assert_eq!(binomial_bound(20, 0.0, 0.001), 0);
 }
 
-/// 200 correlation times tell a standard deviation to 1/sqrt(200) = 7 %, and the correlation at one correlation time to as much: three
-/// of these.
+/// 200 correlation times determine a standard deviation, and the correlation at a lag of one correlation time, to about
+/// 1/sqrt(200) = 7 %. The tolerance is three of these.
 #[test]
 fn a_slow_course_has_its_deviation_and_its_time() {
     let course = slow(0.5, 2.0, (40_000, 0.01), 3);

@@ -1,4 +1,4 @@
-//! What a diagnosis must not depend on: threads, the order of the catalogue, units, numbers that count for nothing.
+//! Tests that a diagnosis does not depend on threads, the order of the catalogue, units, and values that do not count.
 
 use serde_json::Value;
 use stretch_gap::{Diagnosis, Evidence, Options};
@@ -16,7 +16,7 @@ fn toys() -> Vec<Toy> {
     ]
 }
 
-/// All that a diagnosis says, but for the seconds that it took.
+/// Returns the diagnosis as JSON, without its duration.
 fn said(record: &Measured, options: &Options) -> Value {
     let (told, _) = record.diagnosed_by(options);
     let mut all = serde_json::to_value(&told).expect("written");
@@ -65,7 +65,8 @@ fn assert_alike(one: &(Diagnosis, Evidence), other: &(Diagnosis, Evidence), rela
     );
 }
 
-/// Sets are fitted from where the search comes to them, so that another order may leave the last steps of a fit another way.
+/// The starting point of a fit depends on the order in which effects are added, so results may differ by the last steps
+/// of a fit.
 #[test]
 fn the_order_of_the_catalogue_changes_nothing() {
     for toy in toys() {
@@ -75,7 +76,7 @@ fn the_order_of_the_catalogue_changes_nothing() {
     }
 }
 
-/// Powers of two are exact, so that every number without a unit is the same; others round every sample.
+/// Scaling by a power of two is exact, so dimensionless results stay the same; any other factor rounds every sample.
 #[test]
 fn units_change_nothing_that_has_none() {
     for toy in toys() {

@@ -1,4 +1,5 @@
-//! The noise of a channel, estimated from its recording, and signals that pass for noise.
+//! Tests the noise of a channel that is estimated from its recording, and signals that cannot be distinguished from
+//! noise.
 
 use stretch_gap::{Noise, RandomGenerator, VerdictKind, WINDOW, noise_variance};
 
@@ -25,7 +26,8 @@ fn white_noise_is_found_beside_motion_and_rests() {
     for (seed, sd) in [1e-6, 0.02, 3.0].into_iter().enumerate() {
         let noise = white(sd, seed as u64);
         approx::assert_relative_eq!(deviation(&noise, 0.01), sd, max_relative = TOLD);
-        // Moves of a second between rests of two: bends of 0.01^2 (2 pi)^2 of the amplitude in a third of the samples.
+        // One-second movements with rests of two seconds between them. The second differences are 0.01^2 (2 pi)^2 of
+        // the amplitude, in a third of the samples.
         let moved = |i: usize| match (i / 100) % 3 {
             0 => 20.0 * sd * (1.0 - (std::f64::consts::TAU * 0.01 * (i % 100) as f64).cos()),
             _ => 0.0,
@@ -35,7 +37,7 @@ fn white_noise_is_found_beside_motion_and_rests() {
     }
 }
 
-/// Noise has a unit: what is written in another one has that many times the noise, to the bit where the factor is a power of two.
+/// The noise scales with the unit of the recording; if the factor is a power of two, it does so to the bit.
 #[test]
 fn noise_is_in_the_unit_of_its_record() {
     let record = white(0.1, 1);
@@ -44,7 +46,8 @@ fn noise_is_in_the_unit_of_its_record() {
     assert_eq!(deviation(&scaled, 0.01), 1024.0 * deviation(&shifted, 0.01));
 }
 
-/// A converter of steps q adds q^2/12; a median of whole steps is off by half a step of a size of 0.6745 sqrt 6 = 1.65 deviations at most.
+/// A converter with the step q adds the variance q^2/12. The median second difference is 0.6745 sqrt 6 = 1.65 standard
+/// deviations and is rounded to whole steps, so it is wrong by at most half a step.
 #[test]
 fn rounding_is_noise_to_half_a_step_of_the_median() {
     for share in [0.25, 0.5, 1.0, 2.0] {
@@ -62,22 +65,22 @@ fn rounding_is_noise_to_half_a_step_of_the_median() {
     }
 }
 
-/// The mains are no noise, wherever they fold to: 50 Hz of 250 Hz and of 100, 60 Hz at 40 Hz of 100. Below 0.15 turns a sample they may be
-/// motion, and stay.
+/// Mains hum does not count as noise, also if it is aliased: 50 Hz at sample rates of 250 and 100 Hz, and 60 Hz, which
+/// appears at 40 Hz, at 100 Hz. Hum of less than 0.15 periods per sample may be motion and stays.
 #[test]
 fn a_hum_of_the_mains_is_left_out() {
     for (hertz, dt_s) in [(50.0, 0.01), (60.0, 0.01), (50.0, 0.004), (60.0, 0.004)] {
         let wave = |i: usize| (std::f64::consts::TAU * hertz * dt_s * i as f64 + 0.7).cos();
         let record: Vec<f64> = white(0.1, 3).iter().enumerate().map(|(i, x)| x + wave(i)).collect();
-        // Of each second some waves of noise are taken with it, and made up for.
+        // Some noise is removed together with the hum; the estimate is corrected for this.
         approx::assert_relative_eq!(deviation(&record, dt_s), 0.1, max_relative = 1.5 * TOLD);
     }
 }
 
-/// A resonance that rings all the time passes for noise, because nothing in the record shows that
-/// it is none. Second differences of A sin(2 pi f t) have the mean square A^2 (2 - 2 cos(2 pi f
-/// dt))^2/2. A sixth of it is reported as variance, and up to 1/0.4549 times that, because the
-/// median of a sine's square, which is its mean, is taken for a normal variable's.
+/// A resonance that rings all the time counts as noise, because nothing in the recording shows that it is none. Second
+/// differences of A sin(2 pi f t) have the mean square A^2 (2 - 2 cos(2 pi f dt))^2/2. A sixth of it is reported as
+/// variance, and up to 1/0.4549 times that, because the estimate assumes the median of a squared normal variable,
+/// whereas the median of a squared sine equals its mean.
 #[test]
 fn a_resonance_passes_for_noise_as_far_as_its_bends_do() {
     for (hertz, amplitude) in [(5.0, 1.0), (12.0, 0.3), (20.0, 1.0)] {
@@ -98,20 +101,21 @@ fn a_resonance_passes_for_noise_as_far_as_its_bends_do() {
     }
 }
 
-/// Correlated noise is only partly visible from sample to sample: with a correlation rho^k second
-/// differences hold 6 - 8 rho + 2 rho^2 of the variance, a sixth of which is reported.
+/// Correlated noise is only partly visible from sample to sample: with a correlation rho^k second differences have 6 -
+/// 8 rho + 2 rho^2 times the variance, and a sixth of that is reported.
 #[test]
 fn differences_tell_of_slow_noise_what_changes_from_sample_to_sample() {
     for memory in [2.0_f64, 10.0, 50.0] {
         let record = slow(0.1, 0.01 * memory, (SAMPLES, 0.01), 5);
         let kept = (-1.0 / memory).exp();
         let expected = 0.1 * ((6.0 - 8.0 * kept + 2.0 * kept * kept) / 6.0).sqrt();
-        // Correlations of its differences are those of white noise at most.
+        // Its differences are at most as correlated as those of white noise, so the tolerance is the same.
         approx::assert_relative_eq!(deviation(&record, 0.01), expected, max_relative = TOLD);
     }
 }
 
-/// Windows are still, and tell slow noise as well: the same level whatever is stated, as many samples as asked for.
+/// Windows in which nothing moves also show slow noise, which second differences miss. Noise that is drawn from the
+/// estimate has the same level.
 #[test]
 fn windows_tell_slow_noise_that_differences_miss() {
     let record = slow(0.1, 0.2, (100 * WINDOW, 0.01), 6);
@@ -119,7 +123,8 @@ fn windows_tell_slow_noise_that_differences_miss() {
     let noisy: Vec<f64> = record.iter().map(|x| x + 0.02 * random.gauss()).collect();
     let windows: Vec<Vec<f64>> = noisy.chunks(WINDOW).map(<[f64]>::to_vec).collect();
     let found = Noise::of_windows(&windows, Some(0.02), true, 0.01).expect("enough windows");
-    // 100 windows of 1.28 s hold some 320 correlation times of 0.2 s twice over: 5 %, and parabolas take what is slower than a window.
+    // 100 windows of 1.28 s contain about 320 independent samples of a process with a correlation time of 0.2 s, which
+    // determine its deviation to 5 %. Parabolas remove what is slower than a window.
     approx::assert_relative_eq!(found.sd(), 0.1, max_relative = 0.25);
     let (share, memory) = found.slow();
     assert!(share > 0.85 && (10.0..40.0).contains(&memory), "{share} {memory}");
@@ -128,7 +133,8 @@ fn windows_tell_slow_noise_that_differences_miss() {
     assert!(quick.sd() < 0.05 && quick.slow().0 == 0.0, "{quick:?}");
     let samples = found.samples(50_000, &mut random);
     let power = samples.iter().map(|x| x * x).sum::<f64>() / 50_000.0;
-    // 50 000 samples of a memory of 20: 1250 independent ones of a square, 4 %, three of them.
+    // 50 000 samples with a memory of 20 samples contain 1250 independent squares, which determine their mean to 4 %.
+    // The tolerance is about two of these.
     approx::assert_relative_eq!(power.sqrt(), found.sd(), max_relative = 0.08);
 }
 
@@ -149,7 +155,8 @@ fn noise_from_the_record_names_what_stated_noise_names() {
     }
 }
 
-/// Noise that is stated a third too large or a third too small hides no effect, and what is stated too small is a gap without a name.
+/// If the stated noise is half too large, a recording without a missing effect still agrees. If it is 30 % too small,
+/// there is a gap, but no effect is named.
 #[test]
 fn stated_noise_that_is_wrong_names_nothing() {
     for seed in 0..5 {
@@ -157,15 +164,16 @@ fn stated_noise_that_is_wrong_names_nothing() {
         let told = |times| Toy { stated: Some(times), ..toy.clone() }.measured(seed).diagnosed().0;
         let large = told(1.5);
         assert_eq!(large.verdict, VerdictKind::NoGap, "{}", large.sentence);
-        // 1/0.7^2 - 1: twice the variance that is stated.
+        // The excess is 1/0.7^2 - 1 = 1.04: the noise has twice the stated variance.
         let small = told(0.7);
         assert!(small.named.is_empty(), "{}", small.sentence);
-        // Of 1000 samples to test on, a chi-square of 2.04 is known to 0.09, three of them.
+        // With 1000 test samples, a chi-square of 2.04 has a standard deviation of 0.09. The tolerance is three of
+        // these.
         approx::assert_abs_diff_eq!(small.gap.retuned, 1.04, epsilon = 0.28);
     }
 }
 
-/// A few gross errors are no noise, alone or in a row, however large, and leave a hum of the mains to be taken out.
+/// A few gross errors do not count as noise, single or in a row and of any size. Mains hum is still removed.
 #[test]
 fn gross_errors_are_no_noise() {
     for (size, row, hum) in
@@ -179,7 +187,8 @@ fn gross_errors_are_no_noise() {
     }
 }
 
-/// A coarse converter that repeats most values: what it flips by is its noise, and a few gross errors are not.
+/// If a coarse converter repeats most values, its flips between two steps count as noise, but a few gross errors do
+/// not.
 #[test]
 fn gross_errors_are_no_noise_of_a_coarse_converter() {
     let flips = |step: f64, gross: f64| -> Vec<f64> {
@@ -189,18 +198,19 @@ fn gross_errors_are_no_noise_of_a_coarse_converter() {
         };
         white(1.0, 9).iter().enumerate().map(coarse).collect()
     };
-    // A thousand samples a second, at which the mains are too slow to be taken out.
+    // At a thousand samples per second, mains hum is too slow to be removed.
     let plain = deviation(&flips(0.7, 0.0), 0.001);
-    // One value in 80 is a step off: a variance of 0.012 of its square.
+    // One value in 80 differs by a step, so the variance is 0.012 of the squared step.
     approx::assert_relative_eq!(plain, 0.7 * 0.0124_f64.sqrt(), max_relative = 0.1);
     for gross in [30.0, -1e5] {
-        // Three differences of each of four errors are left out, one in 60 of those that are not 0.
+        // Each of four errors affects three differences, which are left out: one in 60 of the differences that are not
+        // 0.
         let found = deviation(&flips(0.7, gross), 0.001);
         approx::assert_relative_eq!(found, plain, max_relative = 0.02);
     }
 }
 
-/// What is missing is named with gross errors as without them, and they are counted.
+/// Gross errors hide no missing effect, and a note gives their number.
 #[test]
 fn gross_errors_hide_no_effect() {
     for (size, row) in [(5.0, 1), (-40.0, 1), (5.0, 3)] {
@@ -219,7 +229,8 @@ fn gross_errors_hide_no_effect() {
     }
 }
 
-/// Of a noise that is stated so large that no recording could be so quiet nothing is taken for agreement.
+/// If the noise is stated so large that no real recording could have so small a residual, the diagnosis does not report
+/// agreement.
 #[test]
 fn noise_that_no_record_has_is_told() {
     let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);

@@ -14,7 +14,8 @@ fn drifting(described: SlowDrift, course: (f64, f64), seed: u64) -> Toy {
 
 const DESCRIBED: SlowDrift = SlowDrift { sd: 0.03, correlation_s: 3.0 };
 
-/// As described, half as large, twice as large, quicker: of 20 records none has a name, because a name takes 12 nats.
+/// The drift is as described, half as large, twice as large or quicker. In 20 recordings no effect is named, because
+/// this requires 12 nats.
 #[test]
 fn a_drift_that_is_described_is_no_effect() {
     for (i, course) in [(0.03, 3.0), (0.015, 3.0), (0.06, 3.0), (0.03, 1.0)].into_iter().enumerate()
@@ -32,7 +33,7 @@ fn swings(notes: &[Note]) -> Vec<String> {
     texts(notes).into_iter().filter(|note| note.contains("oscillates")).collect()
 }
 
-/// A swing that a drift could explain is no gap, but it is reported with its frequency and size.
+/// An oscillation that a drift could explain is no gap, but it is reported with its frequency and size.
 #[test]
 fn a_drift_that_swings_is_told() {
     for seed in 0..5 {
@@ -47,16 +48,17 @@ fn a_drift_that_swings_is_told() {
         let [note] = &swings(&told.notes)[..] else { panic!("one note: {:?}", told.notes) };
         let rest = note.strip_prefix(&begins).expect(note);
         let number = |at: usize| rest.split(' ').nth(at).and_then(|x| x.parse().ok()).expect(note);
-        // A trial of 10 s parts frequencies by half of a tenth, and the drift, a third as large, adds to a swing or takes from it.
+        // A trial of 10 s resolves frequencies to about 0.05 Hz. The drift is a third as large as the oscillation and
+        // may change its apparent amplitude.
         let [hertz, percent]: [f64; 2] = [number(0), number(3)];
         approx::assert_abs_diff_eq!(hertz, 0.7, epsilon = 0.05);
         approx::assert_relative_eq!(percent, 100.0 * share, max_relative = 0.3);
     }
 }
 
-/// An effect whose changes, 0.06, are twelve times the drift's: no tried size of the drift, at most
-/// 2.5 times the described one, does as much. (With a drift of half its size the same effect is
-/// left unnamed, because the drift may explain so much.)
+/// An effect changes the output by 0.06, twelve times as much as the drift. The largest size of the drift that is tried
+/// is 2.5 times the described one, so the drift cannot explain the effect. (If the described drift were half as large
+/// as the effect, the effect would not be named.)
 #[test]
 fn an_effect_beside_a_smaller_drift_is_found() {
     let described = SlowDrift { sd: 0.005, correlation_s: 3.0 };
@@ -65,13 +67,12 @@ fn an_effect_beside_a_smaller_drift_is_found() {
         let told = toy.measured(seed).diagnosed().0;
         assert_eq!(told.named, ["quadratic"], "{}", told.sentence);
         let value = told.candidates[0].parameters[0].value;
-        // A drift a twelfth as large moves the size by less than that, even were it all of the effect's form.
+        // A drift of a twelfth of the effect changes the estimated size by at most a twelfth.
         approx::assert_abs_diff_eq!(value, 0.4, epsilon = 0.4 / 12.0);
     }
 }
 
-/// An undescribed drift is a gap, and no effect of the catalogue is to blame, because the same
-/// drift is in no way an effect's.
+/// A drift that the simulator does not describe is a gap.
 #[test]
 fn a_drift_that_nobody_described_is_a_gap() {
     for seed in 0..5 {
@@ -101,7 +102,7 @@ fn offsets_by_trial_are_no_effect_where_they_are_described() {
     }
 }
 
-/// A recording whose output drifts by so many times its noise.
+/// Returns a recording whose output drifts by `times` its noise.
 fn wandering(times: f64, correlation_s: f64, seed: u64, hidden: &[(Effect, &[f64])]) -> Measured {
     let recorder_drift = Some(SlowDrift { sd: 0.3, correlation_s: 2.0 });
     let toy = Toy { recorder_drift, ..Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(hidden) };
@@ -111,7 +112,7 @@ fn wandering(times: f64, correlation_s: f64, seed: u64, hidden: &[(Effect, &[f64
     })
 }
 
-/// Of 20 recordings with slow noise as recorders have it, none has a gap; what the noise is taken for is said.
+/// In 20 recordings with typical slow noise of a recorder there is no gap, and a note states the assumed slow noise.
 #[test]
 fn slow_noise_of_a_recorder_is_no_gap() {
     for (times, correlation_s) in [(0.0, 1.0), (0.4, 1.0), (0.7, 3.0), (0.5, 8.0)] {
@@ -126,7 +127,7 @@ fn slow_noise_of_a_recorder_is_no_gap() {
     }
 }
 
-/// A drift larger than the noise of a recorder is a gap, however slow.
+/// A drift that is larger than the noise of a recorder is a gap, however slow it is.
 #[test]
 fn what_wanders_by_more_than_noise_stays_a_gap() {
     for (times, correlation_s) in [(2.0, 1.0), (2.0, 3.0), (5.0, 10.0)] {
@@ -161,7 +162,8 @@ fn simpler_methods_name_a_strong_effect_and_no_noise() {
         let name = Some(effect.name().to_owned());
         assert_eq!(simpler.bic, name);
         assert_eq!(simpler.largest_drop, name);
-        // One change of the output, whose shape goes with its size where the effect is linear in it; a play's is not.
+        // The signature is the change by one size of the effect. Its shape is the right one only if the effect is
+        // linear in its size, which a play is not.
         if effect != Effect::Play {
             assert_eq!(simpler.signature, name);
         }
@@ -174,8 +176,8 @@ fn simpler_methods_name_a_strong_effect_and_no_noise() {
     assert_eq!(plain.baselines, None);
 }
 
-/// A drift that is extrapolated to a test trial later than all fitted ones follows only its law,
-/// and a note gives the range.
+/// If a drift is extrapolated to a test trial that is later than all fitted trials, a note states the fitted and the
+/// extrapolated time.
 #[test]
 fn a_drift_is_told_as_extrapolated() {
     let notes = |effect: Effect, size: f64| {

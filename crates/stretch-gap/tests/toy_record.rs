@@ -1,10 +1,10 @@
-//! Errors of the recording, each reported as what it is, and none if there is none.
+//! Tests that each error of a recording is reported with its kind and size, and that none is reported if there is none.
 
 use stretch_gap::{Diagnosis, Distortion, Gross, GrossKind, RandomGenerator, VerdictKind};
 
 use crate::toys::{Effect, Law, Measured, Toy};
 
-/// A lag and a line behind it, with effects in either.
+/// A lag that drives a line, with effects of the catalogue in both.
 fn chain() -> Toy {
     let mut toy = Toy::of(&[Law::Lag, Law::Line]);
     let all = [Effect::Play, Effect::Quadratic, Effect::Creep];
@@ -17,7 +17,7 @@ fn told(record: &Measured) -> Diagnosis {
     record.diagnosed().0
 }
 
-/// The recording with a column as a recorder wrote it.
+/// Returns the recording with an error in one column.
 fn distorted(record: Measured, column: &str, error: Distortion) -> Measured {
     let (ranges, dt_s) = (record.toy.ranges(), record.toy.dt_s);
     record.rewritten(|x, outputs| {
@@ -33,8 +33,8 @@ fn distorted(record: Measured, column: &str, error: Distortion) -> Measured {
     })
 }
 
-/// The only reported error of a kind in a column. A scale of one column is equivalent to that of
-/// its neighbour, which is reported as well.
+/// Returns the reported error of a kind in a column. Errors in other columns may be reported as well, because a wrong
+/// scale of one column is equivalent to one of its neighbour.
 fn found<'a>(told: &'a Diagnosis, what: GrossKind, column: &str) -> &'a Gross {
     assert_eq!(told.verdict, VerdictKind::Record, "{}", told.sentence);
     let is_it = |g: &&Gross| g.what == what && g.column.as_deref() == Some(column);
@@ -61,7 +61,7 @@ fn clean_records_are_told_clean() {
     }
 }
 
-/// Of the last column in a chain nothing but itself depends on it.
+/// The column is the last one of the chain, so no other stage depends on it.
 #[test]
 fn scale_offset_sign_and_delay_of_an_output_are_told() {
     let none = Distortion::default();
@@ -69,14 +69,14 @@ fn scale_offset_sign_and_delay_of_an_output_are_told() {
         let with = |error| told(&distorted(chain().measured(seed), "y1", error));
         let scaled = with(Distortion { scale: 2.0, ..none });
         let factor = found(&scaled, GrossKind::Scale, "y1").factor.expect("a factor");
-        // The line's own gain, within 5 %, takes part of it.
+        // The gain of the line, with a tolerance of 5 %, absorbs a part of the error.
         approx::assert_relative_eq!(factor, 2.0, max_relative = 0.1);
         let offset = with(Distortion { offset: 1.5, ..none });
         let size = found(&offset, GrossKind::Offset, "y1").offset.expect("an offset");
-        // The line's own zero, within 0.05, takes part of it.
+        // The zero of the line, with a tolerance of 0.05, absorbs a part of the error.
         approx::assert_abs_diff_eq!(size, 1.5, epsilon = 0.1);
-        // Late by the clock of its recorder: no column is held at its ends as a shifted copy would
-        // be.
+        // The recorded column itself is late, instead of a shifted copy of a column, which would be constant at one
+        // end.
         let late =
             told(&Toy { hidden: vec![(1, Effect::Late, vec![0.3])], ..chain() }.measured(seed));
         let delay = found(&late, GrossKind::Delay, "y1").delay_s.expect("a delay");
@@ -86,7 +86,7 @@ fn scale_offset_sign_and_delay_of_an_output_are_told() {
     }
 }
 
-/// What drives the first stage is corrected for it.
+/// Errors of the column that drives the first stage are corrected before the stage is run.
 #[test]
 fn errors_of_the_driving_column_are_told() {
     let none = Distortion::default();
@@ -102,7 +102,7 @@ fn errors_of_the_driving_column_are_told() {
         assert_eq!(late.verdict, VerdictKind::Record, "{}", late.sentence);
         for gross in late.gross.iter().filter(|g| g.what == GrossKind::Delay) {
             let sign = if gross.column.as_deref() == Some("x") { -1.0 } else { 1.0 };
-            // The oscillator's own rate and damping, within tolerances of three per cent and a tenth, take some of it.
+            // Rate and damping of the oscillator, with tolerances of 3 % and 10 %, absorb a part of the delay.
             approx::assert_abs_diff_eq!(
                 sign * gross.delay_s.expect("a delay"),
                 0.4,
@@ -117,7 +117,7 @@ fn errors_of_the_driving_column_are_told() {
     }
 }
 
-/// A copy has the noise of its source; the columns alone say so, before any simulation.
+/// A copied column has the noise of its source, which is visible without any simulation.
 #[test]
 fn a_copied_column_is_told_with_its_factor() {
     let mut record = chain().measured(1);
@@ -133,12 +133,12 @@ fn a_dead_column_is_told_with_where() {
     // In this recording the input covers more than 80 % of its range while y1 is dead. Otherwise a loose sleeve could hide the motion.
     let mut record = chain().measured(1);
     let mut random = RandomGenerator::new(3, 0);
-    // The second trial, from 10 s of the session's samples on.
+    // The second trial: samples 1000 to 1999 of the session.
     record.outputs[1][1000..2000].iter_mut().for_each(|y| *y = 0.1 + 0.01 * random.gauss());
     let told = told(&record);
     let dead = found(&told, GrossKind::Dead, "y1");
     assert_eq!(dead.trial.as_deref(), Some("trial 1"));
-    // Whole blocks of ten samples.
+    // The reported times are those of whole blocks of ten samples.
     assert!(
         dead.from_s.is_some_and(|s| s < 0.11) && dead.to_s.is_some_and(|s| s > 9.8),
         "{dead:?}"
@@ -157,11 +157,11 @@ fn a_stuck_column_is_told_with_where() {
     approx::assert_abs_diff_eq!(stuck.to_s.expect("a time"), 9.0, epsilon = 0.011);
 }
 
-/// Two columns that were swapped are no gap that an effect explains: no effect is named.
+/// If two columns are swapped, no effect is named.
 #[test]
 fn swapped_columns_are_given_no_effect() {
     for seed in 0..3 {
-        // A slow lag: its output is half of its input.
+        // A slow lag, whose output is about half of its input.
         let mut toy = chain();
         toy.parameters[1].nominal = 1.0;
         toy.truth[1] = 1.0;
@@ -176,12 +176,12 @@ fn swapped_columns_are_given_no_effect() {
     }
 }
 
-/// A number of the rig file far beyond its tolerance is reported as such.
+/// A value of the rig file that is wrong by far more than its tolerance is reported.
 #[test]
 fn a_wrong_number_of_the_rig_file_is_told() {
     for seed in 0..3 {
         let mut toy = Toy::of(&[Law::Lag]).may_lack(&[Effect::Play, Effect::Quadratic]);
-        // 0.3 s where the file says 0.1 +- 0.01.
+        // The true value is 0.3 s, and the file states 0.1 +- 0.01 s.
         toy.truth[1] = 0.3;
         let told = told(&toy.measured(seed));
         assert_eq!(told.verdict, VerdictKind::Record, "{}", told.sentence);
@@ -191,7 +191,7 @@ fn a_wrong_number_of_the_rig_file_is_told() {
             (GrossKind::Parameter, Some("lag.tau"))
         );
         assert_eq!(wrong.says, Some(0.1));
-        // Known to a part in a thousand; three per cent are left to its own tolerance.
+        // The data determine the value to one part in a thousand; the tolerance of 3 % allows for the prior.
         approx::assert_relative_eq!(wrong.found.expect("a value"), 0.3, max_relative = 0.03);
         assert!(
             told.sentence
@@ -202,7 +202,8 @@ fn a_wrong_number_of_the_rig_file_is_told() {
     }
 }
 
-/// A factor that no sensor errs by is the simulator's unit, with which parameters of some per cent and no effect can do anything.
+/// A factor that no sensor error explains is reported as a difference in units between simulator and recording.
+/// Parameters with tolerances of a few per cent and effects cannot explain it.
 #[test]
 fn a_factor_beyond_sensors_is_told_of_the_simulator() {
     let degrees = 180.0 / std::f64::consts::PI;
@@ -211,7 +212,7 @@ fn a_factor_beyond_sensors_is_told_of_the_simulator() {
         let told =
             told(&toy.measured(3).rewritten(|_, y| y[0].iter_mut().for_each(|y| *y *= factor)));
         let gross = found(&told, GrossKind::Factor, "y0");
-        // The lag's own gain, within 5 %, takes part of it.
+        // The gain of the lag, with a tolerance of 5 %, absorbs a part of the factor.
         approx::assert_relative_eq!(gross.factor.expect("a factor"), factor, max_relative = 0.1);
         assert!(
             told.sentence

@@ -1,4 +1,4 @@
-//! What a diagnosis refuses, where it stops, and how it keeps within a budget.
+//! Tests what a diagnosis refuses, that it can be stopped, and that it keeps within a budget.
 
 use std::sync::{
     Mutex,
@@ -13,12 +13,13 @@ fn refused(record: &Measured) -> GapError {
     diagnose(record, &Options::default(), &|_| (), &|| false).expect_err("it is refused")
 }
 
-/// An oscillator whose step of integration may be doubled within a sample of 50 ms, with little noise.
+/// An oscillator with little noise, whose sample time of 50 ms is long enough for a doubled step of integration.
 fn oscillator(step_s: f64) -> Toy {
     Toy { dt_s: 0.05, noise: 0.001, step_s, ..Toy::of(&[Law::Oscillator]) }
 }
 
-/// Halving a step of 25 ms moves an oscillator of 1 Hz by some (2 pi 0.025)^2/6 of its amplitude of a third: more than such noise.
+/// Halving a step of 25 ms changes the output of an oscillator of 1 Hz by about (2 pi 0.025)^2/6 of its amplitude of
+/// 1/3, which is more than this noise.
 #[test]
 fn an_integrator_that_is_too_coarse_is_refused() {
     match refused(&oscillator(0.025).measured(1)) {
@@ -28,14 +29,15 @@ fn an_integrator_that_is_too_coarse_is_refused() {
         }
         other => panic!("{other}"),
     }
-    // With noise a thousand times as large, that is nothing; and a tenth of the step moves a hundredth as much.
+    // With noise that is a thousand times as large, this change is not visible. With a tenth of the step, the change is
+    // a hundredth as large.
     let noisy = Toy { noise: 1.0, ..oscillator(0.025) };
     assert!(noisy.measured(1).diagnosed().0.named.is_empty());
     assert!(oscillator(0.0025).measured(1).diagnosed().0.named.is_empty());
 }
 
-/// Steps twice as long are tried first: where they are too long the simulator's own are taken, and nothing is refused. The error goes with
-/// the square of the step: from one step on all do.
+/// Steps of twice the length are tried first. If they are too long, the simulator's own step is used, and nothing is
+/// refused. The error is proportional to the square of the step, so below some step every step is fine enough.
 #[test]
 fn an_integrator_that_is_just_fine_enough_is_run_at_its_own_step() {
     let verdicts = [0.025, 0.0125, 0.00625, 0.003125, 0.0015625].map(|step_s| {
@@ -81,13 +83,13 @@ fn a_simulation_that_fails_from_the_start_is_refused_and_one_that_is_gone_ends_a
         matches!(not_finite, GapError::NotFinite { ref stage, ref asked, .. } if stage == "line" && asked.starts_with("asked for ")),
         "{not_finite}"
     );
-    // 1 is the gain as shipped.
+    // The gain as shipped is 1, so the simulator refuses it.
     let refusing = refused(&failing(Fails::Above(0, 0.5)).measured(1));
     assert_eq!(
         refusing.to_string(),
         "a value that it refuses (asked for line.gain = 1 u/v, line.zero = 0.2 u)"
     );
-    // At any time, in whatever part of a diagnosis: nothing that it says later is asked for.
+    // A simulator that is gone ends the diagnosis at any time, and is not called again.
     let whole = failing(Fails::GoneAfter(usize::MAX)).measured(1);
     whole.diagnosed();
     for share in [0.0, 0.1, 0.3, 0.5, 0.7, 0.9] {
@@ -97,13 +99,13 @@ fn a_simulation_that_fails_from_the_start_is_refused_and_one_that_is_gone_ends_a
     }
 }
 
-/// Values that cannot be simulated and that no fit needs cost nothing.
+/// Parameter values that cannot be simulated do not matter if no fit needs them.
 #[test]
 fn a_fit_does_not_mind_what_cannot_be_simulated_beyond_it() {
     let mut toy = Toy::of(&[Law::Line]).off_by(&[2.0, 1.0]);
     let free = toy.measured(1).diagnosed().0;
     approx::assert_abs_diff_eq!(free.parameters[0].fitted, 1.1, epsilon = 0.005);
-    // Beyond what the bench has, nothing is lost.
+    // The true value can still be simulated.
     toy.fails = Some(Fails::Above(0, 1.13));
     let beyond = toy.measured(1).diagnosed().0;
     approx::assert_abs_diff_eq!(
@@ -121,7 +123,8 @@ fn a_bench_beyond_what_can_be_simulated_is_fitted_up_to_there() {
     assert!((1.0..=1.06).contains(&told.parameters[0].fitted), "{:?}", told.parameters[0]);
 }
 
-/// An effect that cannot be simulated is out, and all others are looked at; without it nothing may be missing, and that is not said.
+/// An effect that cannot be simulated is left out, and all others are examined. If no other effect is missing, the
+/// diagnosis does not report agreement.
 #[test]
 fn an_effect_that_cannot_be_simulated_is_told_and_ends_nothing() {
     let toy = |fails, hidden: &[(Effect, &[f64])]| {
@@ -140,7 +143,7 @@ fn an_effect_that_cannot_be_simulated_is_told_and_ends_nothing() {
                 .iter()
                 .any(|note| note.contains(&format!(" with {name}; the first: line: ")))
     };
-    // Never, or only on the trials that are not fitted.
+    // The effect can never be simulated, or (below) not over all four trials.
     let play = toy(Fails::With(Effect::Quadratic, 0), &[(Effect::Play, &[0.1])]);
     assert_eq!(play.named, [Effect::Play.name()]);
     assert!(is_told(&play), "{} {:?}", play.sentence, play.notes);
@@ -154,10 +157,11 @@ fn an_effect_that_cannot_be_simulated_is_told_and_ends_nothing() {
     assert!(sound.is_agreement() && sound.reservations.is_empty());
 }
 
-/// The largest batch of runs: a creep is screened at two sizes of either sign and at three times.
+/// Number of runs in the largest batch: a creep is screened at two sizes of either sign and three time constants each.
 const BATCH: usize = 12;
 
-/// A stop is asked for before every run or batch of runs: once it says yes, no further one begins, on one thread.
+/// The stop function is called before every run or batch of runs. Once it returns true, no further batch begins (on one
+/// thread).
 #[test]
 fn a_stop_is_honoured_before_the_next_run() {
     let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(Effect::Play, &[0.1])]);
@@ -206,7 +210,7 @@ fn budgeted(budget: Option<usize>) -> (Diagnosis, usize) {
     (told, record.runs())
 }
 
-/// A budget that does not last is reported, with the runs that were made. Names are then based on the fits until then.
+/// A spent budget is reported, with the number of runs. Names are then based on the fits so far.
 #[test]
 fn a_budget_that_is_spent_is_told() {
     let (free, needed) = budgeted(Some(usize::MAX));
@@ -231,14 +235,14 @@ fn a_budget_that_is_spent_is_told() {
     }
 }
 
-/// If runs are not counted, no number is reported; with room enough the answer is the same.
+/// If runs are not counted, no number is reported. With a sufficient budget the answer is the same.
 #[test]
 fn a_budget_that_lasts_alters_no_name() {
     let (free, _) = budgeted(None);
     let (counted, _) = budgeted(Some(1_000_000));
     assert_eq!(free.model_runs, None);
     assert_eq!((&free.named, free.verdict), (&counted.named, counted.verdict));
-    // One is run at steps twice as long, which are the same for a line.
+    // One diagnosis uses steps of twice the length, which makes no difference for a line.
     approx::assert_relative_eq!(
         free.candidates[0].score,
         counted.candidates[0].score,
@@ -246,7 +250,7 @@ fn a_budget_that_lasts_alters_no_name() {
     );
 }
 
-/// Simulations are counted as the simulator itself counts them, whatever the threads do.
+/// The diagnosis counts as many simulations as the simulator, for any number of threads.
 #[test]
 fn simulations_are_counted() {
     let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(Effect::Play, &[0.1])]);

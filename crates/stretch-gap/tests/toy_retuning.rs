@@ -1,19 +1,20 @@
-//! Re-tuning recovers parameters, and says how well.
+//! Tests that re-tuning recovers parameters and reports their uncertainties.
 
 use stretch_gap::{Diagnosis, Knowledge, Options, RandomGenerator};
 
 use crate::toys::{Effect, Law, Measured, Toy, binomial_bound, slow};
 
-/// Samples that a fit takes as one observation: half a second of 10 ms.
+/// Number of samples that a fit counts as one observation: half a second at 100 Hz.
 const BLOCK: f64 = 50.0;
 
 fn told(record: &Measured) -> Diagnosis {
     record.diagnosed().0
 }
 
-/// In white noise a parameter errs by its posterior deviation over sqrt(50), because a block counts as one observation, and is drawn to its nominal
-/// value by sd^2/tolerance^2 of the distance. Of 80 numbers none errs by 4.5 deviations (7 in 10^6 each); half a deviation is left to the
-/// midpoint rule, which lies (2 pi rate h)^2/6 = 1.6e-4 off in the rate.
+/// In white noise, the error of a parameter is its posterior standard deviation divided by sqrt(50), because a block
+/// counts as one observation. In addition, the prior pulls it towards its nominal value by sd^2/tolerance^2 of the
+/// distance. None of 80 parameters should be wrong by 4.5 standard deviations (probability 7e-6 each). Half a standard
+/// deviation is added for the midpoint rule, whose relative error of the rate is (2 pi rate h)^2/6 = 1.6e-4.
 #[test]
 fn parameters_come_back_as_near_as_theory_says() {
     let mut random = RandomGenerator::new(1, 0);
@@ -39,8 +40,9 @@ fn parameters_come_back_as_near_as_theory_says() {
     }
 }
 
-/// What an observation a block is for: noise of which a quarter of a second is alike. Intervals of 95 % miss one in twenty; of 80 no more than
-/// the binomial quantile of one in a thousand.
+/// One observation per block is meant for noise with a correlation time of a quarter of a second. The 95 % intervals
+/// then miss one in twenty values. Of 80 values, the test allows the number of misses that a binomial count exceeds
+/// once in a thousand.
 #[test]
 fn intervals_cover_where_noise_has_a_memory() {
     const SEEDS: u64 = 40;
@@ -48,7 +50,7 @@ fn intervals_cover_where_noise_has_a_memory() {
     let mut missed = 0;
     for seed in 0..SEEDS {
         let mut toy = Toy::of(&[Law::Line]).off_by(&[random.gauss(), random.gauss()]);
-        // All of the noise is remembered for 0.25 s: its integral time is half a second.
+        // The correlation time of the noise is 0.25 s, so its integral time is half a second.
         toy.courses = vec![(1, slow(0.01, 0.25, (toy.samples(), toy.dt_s), seed))];
         (toy.noise, toy.stated) = (0.001, Some(10.0));
         let told = told(&toy.measured(seed));
@@ -59,7 +61,7 @@ fn intervals_cover_where_noise_has_a_memory() {
     assert!(missed <= most, "{missed} of {} missed, at most {most}", 2 * SEEDS);
 }
 
-/// The same of an effect's number: white noise, so that far fewer than one in twenty miss.
+/// The same test for the parameter of an effect. The noise is white, so far fewer than one in twenty intervals miss.
 #[test]
 fn intervals_of_effects_cover() {
     const SEEDS: u64 = 20;
@@ -78,7 +80,7 @@ fn intervals_of_effects_cover() {
     assert!(missed <= binomial_bound(SEEDS as usize, 0.05, 1e-3), "{missed} of {SEEDS}");
 }
 
-/// Of a constant input the gain and the zero of a line do the same, and the time of a lag does nothing.
+/// With a constant input, gain and zero of a line have the same effect, and the time constant of a lag has none.
 #[test]
 fn what_nothing_excites_is_told() {
     let constant = |law| {
@@ -99,8 +101,8 @@ fn what_nothing_excites_is_told() {
     assert!(lag[0].like.is_empty() && lag[0].sentence().is_none());
 }
 
-/// Of a line the posterior deviation is that of a ridge regression: 1/sd^2 = 1/tolerance^2 + sum (x - mean x)^2/(50 noise^2) for the gain but
-/// for the prior of the zero, which is worth 1/1500 of the data.
+/// The posterior standard deviation of the gain of a line is that of a ridge regression: 1/sd^2 = 1/tolerance^2 + sum
+/// (x - mean x)^2/(50 noise^2). This neglects the prior of the zero.
 #[test]
 fn deviations_are_those_of_a_regression_whatever_the_noise_is() {
     for noise in [0.002, 0.05, 0.4, 4.0] {
@@ -112,7 +114,8 @@ fn deviations_are_those_of_a_regression_whatever_the_noise_is() {
         let data = x.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (BLOCK * noise * noise);
         let expected = 1.0 / (data + 1.0 / 0.05_f64.powi(2)).sqrt();
         let gain = &told.identifiability[0];
-        // mean x is up to 0.1, so that with a prior instead of data for the zero up to 0.01/0.125 more is known.
+        // The mean of x is up to 0.1. If the zero is known from its prior and not from the data, the gain has up to
+        // 0.01/0.125 more information.
         approx::assert_relative_eq!(gain.sd, expected, max_relative = 0.05);
         assert!(gain.sd_alone <= gain.sd);
         let share = gain.sd / gain.tolerance;
@@ -136,8 +139,7 @@ fn a_parameter_at_the_end_of_its_tolerances_is_told() {
     );
 }
 
-/// Stages that share a parameter are fitted together: both recordings determine the gain of two lags, and it is known
-/// better than from one.
+/// Stages that share a parameter are fitted together: the gain of two lags is known better than from one lag alone.
 #[test]
 fn a_shared_parameter_is_known_from_both_stages() {
     let alone = Toy::of(&[Law::Lag]).off_by(&[1.0, 0.0]);
@@ -149,7 +151,7 @@ fn a_shared_parameter_is_known_from_both_stages() {
     approx::assert_abs_diff_eq!(two.fitted, 1.05, epsilon = 5.0 * two.sd / BLOCK.sqrt());
 }
 
-/// Held-out samples of long trials enter no fit: whatever they hold, the re-tuned parameters are the same bits.
+/// Held-out and test samples enter no fit: if their values change, the re-tuned parameters stay the same to the bit.
 #[test]
 fn nothing_is_fitted_by_what_is_held_out_or_tested() {
     let toy = Toy { trials: vec![(4000, false), (1000, true)], ..Toy::of(&[Law::Line]) };

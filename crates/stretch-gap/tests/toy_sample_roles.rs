@@ -1,4 +1,4 @@
-//! Division of a session: every sample has one role, by rules that are known beforehand.
+//! Division of a session: every sample has exactly one role, by fixed rules.
 
 use proptest::{prelude::*, test_runner::RngSeed};
 use stretch_gap::{BLOCK_S, GapError, Role, SampleRoles};
@@ -56,7 +56,7 @@ proptest! {
             prop_assert_eq!(of(Role::Fit) + of(Role::Held), not_tested[trial]);
             let order = |role: Role| match role { Role::Fit => 0, Role::Held => 1, Role::Test => 2 };
             prop_assert!(own.is_sorted_by_key(|s| order(s.role)));
-            // Three tenths of 30 s and more are held out, and nothing of less.
+            // Three tenths of a trial are held out if it is 30 s or longer, otherwise nothing.
             let is_long = not_tested[trial] as f64 * dt_s >= 30.0;
             let held = if is_long { (0.3 * not_tested[trial] as f64) as usize } else { 0 };
             prop_assert_eq!(of(Role::Held), held);
@@ -79,7 +79,7 @@ fn a_session_of_tests_alone_is_refused_with_what_to_do() {
     assert_eq!(error, "no trial may be fitted: give at least one trial split = \"fit\"");
 }
 
-/// Samples of the first trials: as many as the trials hold, whatever is tested in them.
+/// The number of samples of the first trials includes test samples.
 #[test]
 fn samples_are_counted_by_trial() {
     let record = toy(vec![(400, false), (600, true), (800, false)], 0.01).measured(1);
@@ -89,7 +89,8 @@ fn samples_are_counted_by_trial() {
     assert_eq!(roles.of_role(Role::Test).map(|s| s.trial).collect::<Vec<_>>(), [1]);
 }
 
-/// Lengths count in turns of the motion: 8 s at 500 Hz of a motion that turns five times a second hold as much as 80 s of a slow one.
+/// The required length is counted in reversals of the motion: 8 s of a motion with five reversals per second are worth
+/// as much as 80 s of a slow motion.
 #[test]
 fn a_quick_record_is_not_too_short() {
     use crate::toys::Effect;

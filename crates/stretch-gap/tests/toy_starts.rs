@@ -1,10 +1,10 @@
-//! Re-tuning begins at several places within the tolerances, before anything is blamed.
+//! Re-tuning begins at several points within the tolerances, before effects are searched.
 
 use stretch_gap::{Options, Starts, Thresholds, VerdictKind};
 
 use crate::toys::{Effect, Law, Measured, Toy, texts};
 
-/// A pendulum that pulses of `x` push over the top.
+/// A pendulum that is pushed over the top by pulses of `x`.
 fn pendulum(off: &[f64], budget: Option<usize>) -> Measured {
     let toy = Toy { step_s: 0.000625, budget, ..Toy::of(&[Law::Pendulum]) };
     let toy = toy.may_lack(&Effect::ALL).off_by(off);
@@ -24,8 +24,9 @@ fn pendulum(off: &[f64], budget: Option<usize>) -> Measured {
     toy.driven_by(x, 1)
 }
 
-/// Its parameters lie within their tolerances and nothing is missing, but one descent from the parameters as shipped ends where turns are
-/// miscounted, with a gap of hundreds to thousands of variances of the noise, which one effect or another seems to close.
+/// The true parameters are within their tolerances and no effect is missing. However, a single descent from the
+/// parameters as shipped ends at a wrong number of turns. Its gap is hundreds to thousands of variances of the noise,
+/// and some effect seems to close it.
 #[test]
 fn a_pendulum_that_turns_over_is_retuned_and_lacks_nothing() {
     let offs = [
@@ -56,7 +57,7 @@ fn a_pendulum_that_turns_over_is_retuned_and_lacks_nothing() {
     }
 }
 
-/// A diagnosis without a gap that counts costs no simulation more, and one with a gap of one valley little.
+/// If no gap counts, further starts need no simulation. If there is a gap but only one minimum, they need few.
 #[test]
 fn other_starts_cost_nothing_without_a_gap_and_little_with_one() {
     let thresholds = Thresholds { least_gap: f64::INFINITY, ..Thresholds::frozen() };
@@ -70,14 +71,14 @@ fn other_starts_cost_nothing_without_a_gap_and_little_with_one() {
         told.simulations
     };
     let of = |toy: &Toy| [&from_one, &Options::default()].map(|o| simulations(toy, o) as f64);
-    // A screen alone is eleven simulations: what else asks for the gap that counts takes fewer.
+    // A screen alone needs eleven simulations. Other steps that depend on the smallest gap that counts need fewer.
     let [one, several] = of(&quiet);
     assert!((one - several).abs() < 11.0, "{one} {several}");
     let [one, several] = of(&lacking);
     assert!(several > one && several < 1.15 * one, "{one} {several}");
 }
 
-/// The rig is elsewhere than the simulator when each trial begins, and returns within half a second.
+/// At the start of each trial the output deviates from the simulation, and returns within half a second.
 #[test]
 fn a_gap_at_the_beginnings_of_trials_is_noted() {
     let mut record = Toy::of(&[Law::Lag]).may_lack(&Effect::ALL).measured(1);

@@ -1,4 +1,4 @@
-//! Each verdict reached by a toy whose answer is known, and what must not be reached.
+//! Tests each verdict on a toy whose true cause is known.
 
 use crate::{
     consistent::told,
@@ -10,7 +10,7 @@ fn line() -> Toy {
     Toy::of(&[Law::Line]).may_lack(&Effect::ALL)
 }
 
-/// The offset of the bench moves by independent noise, which is outside every catalogue.
+/// Adds white noise to the offset of the recording; no catalogue contains such an effect.
 fn restless(toy: Toy, sd: f64, seed: u64) -> Toy {
     let mut random = RandomGenerator::new(seed, 40);
     let zero = toy.parameter("line.zero");
@@ -18,13 +18,14 @@ fn restless(toy: Toy, sd: f64, seed: u64) -> Toy {
     Toy { courses: vec![(zero, course)], ..toy }
 }
 
-/// `no_gap` is a gap of less than 0.02 on the test trials; noise of 40 000 samples leaves sqrt(2/40 000) = 0.007.
+/// The verdict is `no_gap` if the gap on the test trials is below 0.02. The excess of 40 000 samples of noise has a
+/// standard deviation of sqrt(2/40 000) = 0.007.
 #[test]
 fn what_agrees_as_shipped_has_no_gap() {
     let told = told(&Toy { trials: vec![(5000, false), (40_000, true)], ..line() }.measured(1));
     assert_eq!(told.verdict, VerdictKind::NoGap, "{}", told.sentence);
     assert!(told.ambiguous.is_empty() && told.gross.is_empty());
-    // Of the 5000 fitted ones 0.02: three of these.
+    // For the 5000 fitted samples it is 0.02; the tolerance is three of these.
     assert!(told.gap.raw < 0.021 && told.gap.retuned < 0.06, "{:?}", told.gap);
 }
 
@@ -32,10 +33,12 @@ fn what_agrees_as_shipped_has_no_gap() {
 fn what_agrees_once_re_tuned_lacks_nothing() {
     let told = told(&line().off_by(&[1.5, -1.5]).measured(2));
     assert_eq!(told.verdict, VerdictKind::Parameters, "{}", told.sentence);
-    // 0.075 x and 0.075 in noise of 0.01: x^2 has the mean 4 0.25^2/2 = 0.125; 56 (1 + 0.125) = 63.
+    // The errors are 0.075 x and 0.075, with noise of 0.01. The mean of x^2 is 4 0.25^2/2 = 0.125, so the gap is 56 (1
+    // + 0.125) = 63.
     assert!((told.gap.raw / 63.3 - 1.0).abs() < 0.15, "{:?}", told.gap);
     for (p, off) in told.parameters.iter().zip([1.5, -1.5]) {
-        // 3000 samples tell an offset to 0.01/sqrt(3000), a gain three times worse: 0.01 tolerances; the prior pulls less.
+        // 3000 samples determine an offset to 0.01/sqrt(3000), and a gain three times less accurately, which is 0.01
+        // tolerances. The prior pulls the values by less.
         assert!((p.sigmas - off).abs() < 0.1, "{p:?}");
     }
 }
@@ -59,8 +62,7 @@ fn what_the_catalogue_lacks_is_unknown() {
     assert!(unknown.probability > 0.5, "{unknown:?}");
 }
 
-/// Most of the gap is a known cause, the rest an unknown one: the first is named, the rest is
-/// reported with its share.
+/// A known cause explains most of the gap and is named. The share of the rest is reported.
 #[test]
 fn a_cause_beside_something_else_is_told_in_part() {
     let toy = restless(line().hiding(&[(Effect::Quadratic, &[0.3])]), 0.02, 5);
@@ -84,7 +86,7 @@ fn a_column_of_the_wrong_sign_is_an_error_of_the_record() {
     assert_eq!(told.verdict, VerdictKind::Record, "{}", told.sentence);
 }
 
-/// An output that has nothing to do with the simulator: no effect is named, however well it does.
+/// The output is unrelated to the simulator, so no effect is named.
 #[test]
 fn another_rigs_record_is_the_wrong_one() {
     let mut measured = line().measured(7);
@@ -99,8 +101,8 @@ fn another_rigs_record_is_the_wrong_one() {
     assert!(told.named.is_empty());
 }
 
-/// The true parameters differ from the nominal ones by eight tolerances: the re-tuned ones are at their bounds, more
-/// than noise is left, and no effect of the catalogue is blamed.
+/// The true parameters differ from the nominal ones by eight tolerances. The re-tuned parameters are then at their
+/// bounds, a gap remains, and no effect is named.
 #[test]
 fn parameters_at_their_ends_are_told() {
     let toy = Toy::of(&[Law::Oscillator]).off_by(&[0.0, 8.0, 8.0]);
@@ -110,8 +112,8 @@ fn parameters_at_their_ends_are_told() {
     assert!(ends >= 1, "{:?}", told.parameters);
 }
 
-/// Four times the largest size that the catalogue allows: an effect at the end of its range
-/// compensates for something else.
+/// The effect has four times the largest size in the catalogue. An effect at the end of its range counts as a
+/// compensation for another cause.
 #[test]
 fn an_effect_at_the_end_of_its_range_is_not_named() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]);
@@ -145,12 +147,11 @@ fn causes_of_two_stages_are_named_where_they_act() {
     let mut named = told.named.clone();
     named.sort();
     assert_eq!(named, ["play", "quadratic_1"], "{}", told.sentence);
-    // Every stage has a separate gap, and keeps its share whatever the other's noise.
+    // Every stage has its own gap and a share of the whole gap.
     assert!(told.location.stages.iter().all(|s| s.share > 0.05), "{:?}", told.location.stages);
 }
 
-/// An effect that is removed from the catalogue does not get another name, unless the other effect
-/// closes as much: this is about effects that are no kin to each other.
+/// If an effect is removed from the catalogue, no dissimilar effect is named in its place.
 #[test]
 fn strangers_get_no_name() {
     let cases: [(Effect, &[f64], &[Effect]); 3] = [
@@ -165,8 +166,8 @@ fn strangers_get_no_name() {
     }
 }
 
-/// Of 40 recordings in which nothing is missing, its parameters anywhere within two tolerances, none gets a name: a
-/// threshold of twelve nats lets chance through in less than one of 1e5.
+/// In 40 recordings in which nothing is missing, with parameters anywhere within two tolerances, no effect is named. By
+/// chance, the threshold of twelve nats is exceeded in less than one of 1e5 recordings.
 #[test]
 fn nothing_is_named_on_noise() {
     for seed in 0..40 {
@@ -181,15 +182,16 @@ fn nothing_is_named_on_noise() {
     }
 }
 
-/// What noise leaves lies within the band of 19 in 20: over 40 recordings of two stages no more outside than a binomial
-/// count of 0.05 exceeds once in a thousand.
+/// The gap by noise alone is within the 95 % band. Of 40 recordings of two stages, the test allows the number outside
+/// that a binomial count of probability 0.05 exceeds once in a thousand.
 #[test]
 fn noise_alone_stays_within_the_null_band() {
     let toy = Toy::of(&[Law::Lag, Law::Line]);
     let is_outside = |seed: &u64| {
         let told = told(&toy.measured(200 + seed));
         let band = told.null_band;
-        // Two stages of 1000 tested samples: 2 sqrt(2/1000) = 0.09 each at the most, and their sum is what counts.
+        // With 1000 test samples, the excess of each of the two stages is at most about 2 sqrt(2/1000) = 0.09. Their
+        // sum counts.
         assert!((0.01..0.2).contains(&band), "{band}");
         told.gap.retuned > band
     };
@@ -197,7 +199,7 @@ fn noise_alone_stays_within_the_null_band() {
     assert!(outside <= binomial_bound(40, 0.05, 0.001), "{outside} of 40");
 }
 
-/// A longer recording knows its noise better: the band falls with the root of its samples, and does not depend on units.
+/// The band is inversely proportional to the root of the number of samples, and does not depend on units.
 #[test]
 fn the_null_band_narrows_with_the_record() {
     let band = |times: usize, units: [f64; 2]| {
@@ -206,13 +208,14 @@ fn the_null_band_narrows_with_the_record() {
         told(&toy.measured(13)).null_band
     };
     let (short, long) = (band(1, [1.0; 2]), band(4, [1.0; 2]));
-    // The same draws at a quarter of the variance; the greater of two parts that both shrink alike.
+    // The draws are the same with a quarter of the variance, for fitted and for test samples alike.
     assert!((short / long / 2.0 - 1.0).abs() < 1e-6, "{short} {long}");
     let other = band(1, [1e3, 1e-3]);
     assert!((short / other - 1.0).abs() < 1e-6, "{short} {other}");
 }
 
-/// A tenth of the rows and seconds that a name needs: whatever is there, none is given, and what to record is said.
+/// If a recording has only a tenth of the required rows and seconds, no effect is named, and the sentence says what to
+/// record.
 #[test]
 fn a_record_that_is_too_short_carries_no_name() {
     let trials = vec![(400, false), (300, true)];

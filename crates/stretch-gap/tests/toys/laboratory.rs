@@ -7,7 +7,8 @@ use super::{
 use stretch_data::{Channel, Trial};
 use stretch_gap::{GapError, Laboratory, Model, Plan};
 
-/// Levels of 0, a half and 1, held for 0.4 s each in an order that is drawn: there x^3 is 1.5 x^2 - 0.5 x.
+/// Returns a motion that holds the levels 0, 1/2 and 1 for 0.4 s each, in random order. On these levels, x^3 equals 1.5
+/// x^2 - 0.5 x.
 pub(crate) fn levels(samples: usize) -> Vec<f64> {
     let mut random = stretch_gap::RandomGenerator::new(5, 0);
     let mut level = 0.0;
@@ -20,7 +21,7 @@ pub(crate) fn levels(samples: usize) -> Vec<f64> {
     (0..samples).map(next).collect()
 }
 
-/// An experiment that drives the first stage by x, with so many minutes of preparation.
+/// An experiment that drives the first stage by x and needs `prepare_min` minutes of preparation.
 fn plan(name: &str, prepare_min: f64, x: Vec<f64>) -> (Plan, Vec<f64>) {
     let channels = vec![Channel { name: "x".into(), values: x.clone() }];
     let time_s = (0..x.len()).map(|i| 0.01 * i as f64).collect();

@@ -1,8 +1,8 @@
-//! What the toys compute: laws of stages, and effects on their inputs and outputs.
+//! The equations of the toys: laws of stages, and effects on their inputs and outputs.
 
 use stretch_gap::{EffectParameter, EffectSpec, ParameterSpec};
 
-/// What a stage computes of its input x.
+/// The law by which a stage computes its output y from its input x.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Law {
     /// y = gain x + zero: linear in its parameters.
@@ -11,10 +11,10 @@ pub(crate) enum Law {
     Lag,
     /// y'' = (2 pi rate)^2 (gain x - y) - 2 damping (2 pi rate) y', by the midpoint rule.
     Oscillator,
-    /// y(t) = gain x(t - delay), on straight lines between samples.
+    /// y(t) = gain x(t - delay), with linear interpolation between samples.
     Delay,
-    /// y'' = (2 pi rate)^2 (gain x - sin y) - 2 damping (2 pi rate) y', by the midpoint rule, from rest at y = 0: it goes over the top
-    /// where gain x is above 1 for long, and y counts its turns.
+    /// y'' = (2 pi rate)^2 (gain x - sin y) - 2 damping (2 pi rate) y', by the midpoint rule, from rest at y = 0. It
+    /// turns over if gain x stays above 1, and y is the angle including full turns.
     Pendulum,
 }
 
@@ -29,7 +29,8 @@ impl Law {
         }
     }
 
-    /// As they ship, tolerances some per cent; units of the input are `v`, of the output `u`.
+    /// Returns the nominal parameters, with tolerances of some per cent. The unit of the input is `v`, that of the
+    /// output `u`.
     pub(crate) fn parameters(self) -> Vec<ParameterSpec> {
         let of = |name: &str, unit: &str, nominal: f64, sd: f64| {
             ParameterSpec::new(&format!("{}.{name}", self.name()), unit, nominal).within(sd)
@@ -54,7 +55,7 @@ impl Law {
     }
 }
 
-/// Factor from a parameter's own unit to the one that a toy is written in.
+/// Returns the factor from the unit of a parameter to the units of a toy.
 pub(crate) fn unit(unit: &str, [input, output]: [f64; 2]) -> f64 {
     match unit {
         "u" => output,
@@ -63,10 +64,11 @@ pub(crate) fn unit(unit: &str, [input, output]: [f64; 2]) -> f64 {
     }
 }
 
-/// What a simulator may lack. Those of the input act before the law, in the order of the model, the others behind it.
+/// An effect that a simulator may lack. Effects on the input act before the law, in the order of the model; the others
+/// act on the output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Effect {
-    /// The input follows within a play of half-width w.
+    /// The input passes a play of half-width w.
     Play,
     /// x + c x^2.
     Quadratic,
@@ -74,18 +76,19 @@ pub(crate) enum Effect {
     Square,
     /// x + c x^3.
     Cubic,
-    /// The input comes d seconds late.
+    /// The input is delayed by d seconds.
     Late,
     /// The output lags by a time constant, s.
     Slow,
-    /// The output sinks by so much a second of the session.
+    /// The output falls at a constant rate during the session.
     Drift,
-    /// y + c (y - lag of y by tau): two numbers, the second of which is a shape.
+    /// y + c (y - z), where z is y after a first-order lag with time constant tau. Of the two parameters, tau is a
+    /// shape.
     Creep,
 }
 
 impl Effect {
-    /// All but the twin.
+    /// All effects except the twin.
     pub(crate) const ALL: [Self; 7] = [
         Self::Play,
         Self::Quadratic,
@@ -109,7 +112,8 @@ impl Effect {
         }
     }
 
-    /// As the catalogue has it; sizes are shares of -1..1, seconds, and shares of it a second.
+    /// Returns the entry of the catalogue. Sizes are in units of the input (which is within -1..1), seconds, or units
+    /// of the input per second.
     pub(crate) fn spec(self, stage: usize) -> EffectSpec {
         let strength = |name, unit, range| vec![EffectParameter::sized(name, unit, range)];
         let parameters = match self {
@@ -131,7 +135,7 @@ impl Effect {
         matches!(self, Self::Play | Self::Quadratic | Self::Square | Self::Cubic | Self::Late)
     }
 
-    /// Alters the samples of one trial that began at a session time, s.
+    /// Applies the effect to the samples of a trial; `start_s` is the session time of its start.
     fn act(self, values: &[f64], signal: &mut [f64], dt_s: f64, start_s: f64) {
         let size = values[0];
         match self {
@@ -159,7 +163,7 @@ impl Effect {
     }
 }
 
-/// So many samples later, on straight lines between samples, the first value held.
+/// Delays a signal by a number of samples, with linear interpolation; before its start, the first value is used.
 fn late(signal: &mut [f64], samples: f64) {
     let own = signal.to_vec();
     let (whole, share) = (samples.floor(), samples - samples.floor());
@@ -170,7 +174,8 @@ fn late(signal: &mut [f64], samples: f64) {
     }
 }
 
-/// A first-order lag at rest at the first value, exact for steps at the samples.
+/// Applies a first-order lag that begins settled at the first value. It is exact for a signal that is constant between
+/// samples.
 fn lag(signal: &mut [f64], tau_s: f64, dt_s: f64) {
     let kept = if tau_s > 0.0 { (-dt_s / tau_s).exp() } else { 0.0 };
     let mut y = signal.first().copied().unwrap_or(0.0);
@@ -183,7 +188,7 @@ fn lag(signal: &mut [f64], tau_s: f64, dt_s: f64) {
 /// One stage over one trial.
 pub(crate) struct Plant<'a> {
     pub(crate) parameters: &'a [f64],
-    /// By parameter: what is added to it at every sample.
+    /// Values that are added to a parameter, one for every sample, with the index of the parameter.
     pub(crate) courses: &'a [(usize, &'a [f64])],
     pub(crate) effects: &'a [(Effect, &'a [f64])],
     pub(crate) dt_s: f64,
@@ -232,7 +237,7 @@ impl Plant<'_> {
         self.parameters[parameter] + courses.map(|(_, course)| course[sample]).sum::<f64>()
     }
 
-    /// What swings against a restoring force of its angle, from rest.
+    /// Integrates an oscillator whose restoring force is a function of its angle, from rest.
     fn swing(&self, x: &[f64], out: &mut [f64], restoring: fn(f64) -> f64) {
         let steps = ((self.dt_s / self.step_s).round() as usize).max(1);
         let h = self.dt_s / steps as f64;

@@ -1,8 +1,9 @@
-//! Simulators whose answers are known: a line, a lag, an oscillator, a delay, alone or one after the other, with a
-//! recording that the same equations made with other parameters, hidden effects and noise of a known size.
+//! Simulators whose correct diagnosis is known: a line, a lag, an oscillator or a delay, alone or in a chain. Their
+//! recordings are computed by the same equations with other parameters, hidden effects and noise of a known size. The
+//! source of a recording is called the bench.
 //!
-//! A [`Toy`] is plain data: a test alters what it needs and asks for the record. Everything that depends on the trait [`Simulator`] is
-//! in this folder. The crate's own unit tests use it, too.
+//! A [`Toy`] is plain data: a test changes fields and then computes the recording. Everything that depends on the trait
+//! [`Simulator`] is in this folder. The unit tests of the crate use it as well.
 //!
 //! ```text
 //! let toy = Toy { hidden: vec![(0, Effect::Quadratic, vec![0.1])], ..Toy::of(&[Law::Line]) };
@@ -31,41 +32,42 @@ pub(crate) fn texts(notes: &[Note]) -> Vec<String> {
 /// A simulator and its bench.
 #[derive(Debug, Clone)]
 pub(crate) struct Toy {
-    /// Its stages: the first is driven by the column `x`, every other by what was measured of the one before.
+    /// Laws of the stages. The first stage is driven by the column `x`, every other by the measured output of the stage
+    /// before.
     pub(crate) laws: Vec<Law>,
-    /// Parameters of all stages in their order: as they ship, with tolerances.
+    /// Nominal parameters of all stages in order, with tolerances.
     pub(crate) parameters: Vec<ParameterSpec>,
-    /// What they are on the bench.
+    /// True values of the parameters.
     pub(crate) truth: Vec<f64>,
     /// Effects that the simulator may lack, each with its stage.
     pub(crate) catalogue: Vec<(usize, Effect)>,
-    /// What the bench has, with its values.
+    /// Effects of the bench, each with its stage and its values.
     pub(crate) hidden: Vec<(usize, Effect, Vec<f64>)>,
-    /// A parameter that moves on the bench: what is added to it at every sample of all trials.
+    /// Parameters that change on the bench: index, and the values that are added at every sample of all trials.
     pub(crate) courses: Vec<(usize, Vec<f64>)>,
     /// Standard deviation of the noise of every output.
     pub(crate) noise: f64,
-    /// What the simulator says that the noise is, as a multiple of it; `None` if it follows from the record.
+    /// Noise that the simulator states, as a multiple of the true noise; `None` if it is estimated from the recording.
     pub(crate) stated: Option<f64>,
-    /// Slow drift that the simulator says its recorder may have.
+    /// Slow drift of the recorder that the simulator describes.
     pub(crate) recorder_drift: Option<SlowDrift>,
-    /// Standard deviation of the noise of the recordinged `x`.
+    /// Standard deviation of the noise of the recorded `x`.
     pub(crate) input_noise: f64,
-    /// Samples of every trial, and whether it is tested on.
+    /// Number of samples of every trial, and whether it is a test trial.
     pub(crate) trials: Vec<(usize, bool)>,
     /// Sample time, s.
     pub(crate) dt_s: f64,
     /// Step of integration, s.
     pub(crate) step_s: f64,
-    /// What the unit of `x`, and that of the outputs, is divided by: 1000 writes millivolts for volts.
+    /// Factors on the values of `x` and of the outputs in the recording: 1000 changes volts to millivolts.
     pub(crate) units: [f64; 2],
-    /// Runs that may be made, where they are counted.
+    /// Budget of runs; `None` if runs are not counted.
     pub(crate) budget: Option<usize>,
     /// Whether each sample, of all trials end to end, was lost (not measured); empty if all were measured.
     pub(crate) is_lost: Vec<bool>,
-    /// Stages whose first parameter is another one: the stage, and the parameter.
+    /// Stages whose first parameter is shared with another stage: the stage, and the index of the shared parameter.
     pub(crate) shared: Vec<(usize, usize)>,
-    /// What happens instead of some runs.
+    /// How some runs fail.
     pub(crate) fails: Option<Fails>,
     /// Session time of the first trial, s.
     pub(crate) begins_s: f64,
@@ -74,13 +76,13 @@ pub(crate) struct Toy {
 /// How a simulator may fail.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Fails {
-    /// It refuses values of a parameter above this one.
+    /// Values of a parameter above a limit are refused.
     Above(usize, f64),
-    /// Its output is no number.
+    /// The output is NaN.
     NotFinite,
-    /// It is no number with an effect, on the first so many trials or more.
+    /// The output is NaN if a run has this effect and covers at least this number of trials.
     With(Effect, usize),
-    /// It is gone after so many runs.
+    /// The simulator is gone after this number of runs.
     GoneAfter(usize),
 }
 
@@ -88,7 +90,8 @@ pub(crate) enum Fails {
 const APART_S: f64 = 60.0;
 
 impl Toy {
-    /// Agrees with its bench but for noise of a hundredth: three trials of 10 s to fit, one of 10 s to test, no effects.
+    /// Creates a toy without effects that agrees with its bench, except for noise of 0.01. It has three trials of 10 s
+    /// for fitting and one for testing.
     pub(crate) fn of(laws: &[Law]) -> Self {
         let named = |i: usize, p: ParameterSpec| {
             let own = p.name.rsplit('.').next().unwrap_or_default();
@@ -121,18 +124,18 @@ impl Toy {
         }
     }
 
-    /// The same with some effects of the first stage in its catalogue.
+    /// The same toy with some effects of the first stage in its catalogue.
     pub(crate) fn may_lack(self, effects: &[Effect]) -> Self {
         Self { catalogue: effects.iter().map(|effect| (0, *effect)).collect(), ..self }
     }
 
-    /// The same with effects of the first stage on its bench.
+    /// The same toy with effects of the first stage on its bench.
     pub(crate) fn hiding(self, effects: &[(Effect, &[f64])]) -> Self {
         let hidden = effects.iter().map(|(effect, values)| (0, *effect, values.to_vec()));
         Self { hidden: hidden.collect(), ..self }
     }
 
-    /// The same with parameters of the bench so many tolerances off.
+    /// The same toy, with parameters of the bench that differ from the nominal ones by these numbers of tolerances.
     pub(crate) fn off_by(mut self, tolerances: &[f64]) -> Self {
         for ((truth, p), off) in self.truth.iter_mut().zip(&self.parameters).zip(tolerances) {
             *truth = p.nominal + off * p.sd;
@@ -150,12 +153,12 @@ impl Toy {
         self.parameters.iter().position(|p| p.name == name).expect("a parameter of that name")
     }
 
-    /// Name of an effect of the catalogue: its own in the first stage, with the stage's number in the others.
+    /// Name of an effect in the catalogue: its own name in the first stage, with the number of the stage in the others.
     pub(crate) fn name(stage: usize, effect: Effect) -> String {
         if stage == 0 { effect.name().to_owned() } else { format!("{}_{stage}", effect.name()) }
     }
 
-    /// What the simulator is made of, in the units that the toy is written in.
+    /// The description of the simulator, in the units of the toy.
     pub(crate) fn description(&self) -> Description {
         let stages = (0..self.laws.len()).map(|i| {
             let name = stage_name(&self.laws, i);
@@ -178,7 +181,7 @@ impl Toy {
         .expect("a description that holds together")
     }
 
-    /// A parameter in the units that the toy is written in.
+    /// Converts a parameter to the units of the toy.
     fn in_units(&self, p: &ParameterSpec) -> ParameterSpec {
         let unit = laws::unit(&p.unit, self.units);
         let mut p = p.clone();
@@ -194,7 +197,7 @@ impl Toy {
         p
     }
 
-    /// The recording that the bench makes, drawn from a seed: `x` is four tones a trial, with values within -1..1.
+    /// Computes the recording of the bench for a seed. In each trial, `x` is a sum of four tones within -1..1.
     pub(crate) fn measured(&self, seed: u64) -> Measured {
         let x = self.trials.iter().enumerate().flat_map(|(trial, (samples, _))| {
             let mut random = RandomGenerator::new(seed, 100 + trial as u64);
@@ -211,7 +214,7 @@ impl Toy {
         self.driven_by(x.collect(), seed)
     }
 
-    /// The recording that the bench makes of an input of one's own, in the units of -1..1.
+    /// Computes the recording of the bench for the given input, which is within -1..1.
     pub(crate) fn driven_by(&self, x: Vec<f64>, seed: u64) -> Measured {
         assert_eq!(x.len(), self.samples(), "one sample of x for each of the trials");
         let mut random = RandomGenerator::new(seed, 7);
@@ -227,7 +230,7 @@ impl Toy {
         Measured::new(self.clone(), x, outputs.collect())
     }
 
-    /// What a stage of the bench makes of its input, without noise.
+    /// Computes the noise-free output of a stage of the bench.
     fn of_bench(&self, stage: usize, input: &[f64]) -> Vec<f64> {
         let own = self.own(stage);
         let parameters: Vec<f64> = own.iter().map(|p| self.truth[*p]).collect();
@@ -275,7 +278,7 @@ impl Toy {
         self.begins_s + APART_S * trial as f64
     }
 
-    /// Samples of every trial.
+    /// Range of the samples of every trial.
     pub(crate) fn ranges(&self) -> Vec<std::ops::Range<usize>> {
         let mut end = 0;
         let one = |(samples, _): &(usize, bool)| {
@@ -286,14 +289,14 @@ impl Toy {
     }
 }
 
-/// Name of a stage: that of its law, with its number where an earlier one has the same.
+/// Name of a stage: that of its law, with the number of the stage if an earlier stage has the same law.
 fn stage_name(laws: &[Law], stage: usize) -> String {
     let name = laws[stage].name();
     if laws[..stage].contains(&laws[stage]) { format!("{name}_{stage}") } else { name.to_owned() }
 }
 
-/// An Ornstein-Uhlenbeck process of a standard deviation and a correlation time, both s and samples of `dt_s` seconds: what a parameter that
-/// drifts slowly does.
+/// Draws an Ornstein-Uhlenbeck process (slow drift) with a standard deviation, a correlation time in s, a number of
+/// samples and a sample time.
 pub(crate) fn slow(
     sd: f64,
     correlation_s: f64,
@@ -310,8 +313,8 @@ pub(crate) fn slow(
     (0..samples).map(next).collect()
 }
 
-/// The greatest count that a binomial variable of `n` draws of probability `p` exceeds with a probability of at most `chance`: what a
-/// test that counts over seeds may allow.
+/// Returns the smallest count that a binomial variable of `n` draws with probability `p` exceeds with a probability of
+/// at most `chance`. Tests that count over seeds allow this count.
 pub(crate) fn binomial_bound(n: usize, p: f64, chance: f64) -> usize {
     let (mut each, mut within) = ((1.0 - p).powi(n as i32), 0.0);
     for k in 0..=n {

@@ -1,4 +1,4 @@
-//! A toy bound to its record: everything that depends on the trait [`Simulator`].
+//! A toy with its recording. This file contains everything that depends on the trait [`Simulator`].
 
 use std::sync::{
     Arc,
@@ -11,16 +11,17 @@ use stretch_gap::{
     RandomGenerator, RecordFacts, Recorded, Run, Simulator, diagnose,
 };
 
-/// A toy with its record. Outputs may be altered in place; for `x`, which the simulator is driven by, see [`Measured::rewritten`].
+/// A toy with its recording. Outputs may be changed in place. To change `x`, which drives the simulator, use
+/// [`Measured::rewritten`].
 #[derive(Debug)]
 pub(crate) struct Measured {
     pub(crate) toy: Toy,
     description: Description,
     /// The column `x`, all trials end to end.
     pub(crate) x: Vec<f64>,
-    /// By stage, the column `y0`, `y1` and so on.
+    /// Recorded output of each stage: the columns `y0`, `y1` and so on.
     pub(crate) outputs: Vec<Vec<f64>>,
-    /// Simulations that were made, those with a corrected column as well.
+    /// Number of simulations so far, including those with a corrected column.
     runs: Arc<AtomicUsize>,
 }
 
@@ -51,14 +52,14 @@ impl Measured {
         Self { toy, description, x, outputs, runs: Arc::default() }
     }
 
-    /// The same toy with a recording that says something else of `x` and of the outputs.
+    /// The same toy with a changed recording.
     pub(crate) fn rewritten(self, by: impl FnOnce(&mut Vec<f64>, &mut [Vec<f64>])) -> Self {
         let Self { toy, mut x, mut outputs, .. } = self;
         by(&mut x, &mut outputs);
         Self::new(toy, x, outputs)
     }
 
-    /// The diagnosis with options as they are.
+    /// Diagnoses the recording with the default options.
     pub(crate) fn diagnosed(&self) -> (Diagnosis, Evidence) {
         self.diagnosed_by(&Options::default())
     }
@@ -67,12 +68,12 @@ impl Measured {
         diagnose(self, options, &|_| (), &|| false).expect("a diagnosis")
     }
 
-    /// Simulations that were made so far.
+    /// Number of simulations so far.
     pub(crate) fn runs(&self) -> usize {
         self.runs.load(Ordering::Relaxed)
     }
 
-    /// The same toy with a column as it was before an error.
+    /// The same toy with an error of a column undone.
     fn without(&self, column: &str, error: Distortion) -> Option<Self> {
         let (mut x, mut outputs) = (self.x.clone(), self.outputs.clone());
         let values = match column {
@@ -87,7 +88,7 @@ impl Measured {
         Some(Self { runs, ..Self::new(self.toy.clone(), x, outputs) })
     }
 
-    /// Input of a stage in the units of -1..1, with another draw of the noise of `x` where that is asked for.
+    /// Input of a stage without the factors [`Toy::units`], with a draw of the noise of `x` if a seed is given.
     fn input_of(&self, stage: usize, input_noise: Option<u64>) -> Vec<f64> {
         let toy = &self.toy;
         if stage > 0 {
@@ -101,7 +102,7 @@ impl Measured {
         x
     }
 
-    /// The output of a stage on an input in the units of -1..1, over the first trials.
+    /// Computes the output of a stage over the first trials, from an input without the factors [`Toy::units`].
     fn compute(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) {
         let toy = &self.toy;
         let own = toy.own(run.stage);

@@ -33,8 +33,8 @@ fn what_agrees_as_shipped_has_no_gap() {
 fn what_agrees_once_re_tuned_lacks_nothing() {
     let told = told(&line().off_by(&[1.5, -1.5]).measured(2));
     assert_eq!(told.verdict, VerdictKind::Parameters, "{}", told.sentence);
-    // The errors are 0.075 x and 0.075, with noise of 0.01. The mean of x^2 is 4 0.25^2/2 = 0.125, so the gap is 56 (1
-    // + 0.125) = 63.
+    // The errors are 0.075 x and 0.075, with noise of 0.01. The mean of x^2 is 4 0.25^2/2 = 0.125, so the gap is 56
+    // times 1.125, which is 63.
     assert!((told.gap.raw / 63.3 - 1.0).abs() < 0.15, "{:?}", told.gap);
     for (p, off) in told.parameters.iter().zip([1.5, -1.5]) {
         // 3000 samples determine an offset to 0.01/sqrt(3000), and a gain three times less accurately, which is 0.01

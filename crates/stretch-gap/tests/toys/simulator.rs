@@ -88,7 +88,7 @@ impl Measured {
         Some(Self { runs, ..Self::new(self.toy.clone(), x, outputs) })
     }
 
-    /// Input of a stage without the factors [`Toy::units`], with a draw of the noise of `x` if a seed is given.
+    /// Input of a stage without the factors `Toy::units`, with a draw of the noise of `x` if a seed is given.
     fn input_of(&self, stage: usize, input_noise: Option<u64>) -> Vec<f64> {
         let toy = &self.toy;
         if stage > 0 {
@@ -102,7 +102,7 @@ impl Measured {
         x
     }
 
-    /// Computes the output of a stage over the first trials, from an input without the factors [`Toy::units`].
+    /// Computes the output of a stage over the first trials, from an input without the factors `Toy::units`.
     fn compute(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) {
         let toy = &self.toy;
         let own = toy.own(run.stage);

@@ -68,9 +68,9 @@ fn command_timing(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize,
     tuned.iter().enumerate().filter_map(timing).collect()
 }
 
-/// Returns the index and the clock of every parameter with a [clock](RecordFacts::drift_clocks). The supply reaches the
-/// chamber only through the inlet, so the clock of the supply stops while the inlet is shut. The clock of a command
-/// lead counts the switches of the valves.
+/// Returns the index and the clock of every parameter with a clock (see `RecordFacts::drift_clocks`). The supply
+/// reaches the chamber only through the inlet, so the clock of the supply stops while the inlet is shut. The clock of a
+/// command lead counts the switches of the valves.
 fn drift_clocks(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize, Vec<u32>)> {
     let trials = &session.trials;
     let switches = || trials.iter().flat_map(|t| timing::switches(&t.inlet, &t.outlet)).collect();

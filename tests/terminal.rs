@@ -155,7 +155,7 @@ fn quiet_says_results_and_errors_and_verbose_says_how() {
         (said(None), said(Some("--quiet")), said(Some("-v")));
     assert!(usual.contains("\nwrote ") && aside.is_empty(), "{usual}{aside}");
     // The sentence comes first, and at most fifteen lines follow. With -q, only the paths follow.
-    let sentence = "On the very data of the fit, poly13 is off by";
+    let sentence = "On the same recordings as the fit, poly13 is off by";
     assert!(usual.starts_with(sentence) && usual.lines().count() <= 17, "{usual}");
     assert!(
         one_line(&usual).contains("movements were found, and at least 8 are needed"),

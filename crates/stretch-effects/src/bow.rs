@@ -111,7 +111,7 @@ impl Operator for BowedGain {
 pub static CURVE: Kind = Kind {
     name: "curve",
     title: "a bent scale",
-    words: "its scale is bent",
+    words: "its scale is nonlinear",
     equation: "y = x + 4 c z (1 - z)(1 + skew (2 z - 1)), z = (x - low)/span",
     usual: &[Side::Input, Side::Output],
     parameters: |e, unit| {

@@ -47,7 +47,7 @@ impl Operator for Crosstalk {
 pub static CROSSTALK: Kind = Kind {
     name: "crosstalk",
     title: "crosstalk",
-    words: "another channel talks across to it",
+    words: "another channel couples into it",
     equation: "y = x + c z (1 + bend z), z the other channel from its middle, over its span",
     usual: &[Side::Output],
     beside: Beside::Another,

@@ -113,8 +113,8 @@ impl Operator for Dahl {
 /// Friction that depends on the position.
 pub static DAHL_FRICTION: Kind = Kind {
     name: "dahl_friction",
-    title: "friction that builds up over a way",
-    words: "it rubs by position: the force builds up over a presliding length, whatever the speed (Dahl)",
+    title: "friction that builds up over a distance",
+    words: "its friction depends on position: the force builds up over a presliding length (Dahl)",
     equation: "y = x + f u behind the stage, x - f u in front of it; du = dp/s (1 - u sign(dp)), p the position",
     beside: Beside::Position,
     parameters: |e, unit| [force(e, unit), shape(e), back()].into(),
@@ -128,8 +128,8 @@ pub static DAHL_FRICTION: Kind = Kind {
 /// Friction that depends on the position and is proportional to another channel.
 pub static LOAD_DAHL_FRICTION: Kind = Kind {
     name: "load_dahl_friction",
-    title: "friction over a way that a load scales",
-    words: "it rubs by position, in proportion to another channel (a load, a voltage)",
+    title: "friction over a distance, scaled by a load",
+    words: "its friction depends on position, in proportion to another channel (a load, a voltage)",
     equation: "y = x + f u |load|/max|load| behind the stage, x - the same in front of it; du = dp/s (1 - u sign(dp)), p the position",
     beside: Beside::PositionAndLoad,
     parameters: |e, unit| [force(e, unit), shape(e), back()].into(),
@@ -144,7 +144,7 @@ pub static LOAD_DAHL_FRICTION: Kind = Kind {
 pub static PLAY_FRICTION: Kind = Kind {
     name: "play_friction",
     title: "friction behind a play",
-    words: "it rubs by position once a gap is taken up: play and friction in series",
+    words: "its friction depends on position after a gap is closed: play and friction in series",
     equation: "y = x + f u behind the stage, x - f u in front of it; du = dz/s (1 - u sign(dz)), z = play(p, w), p the position",
     beside: Beside::Position,
     parameters: |e, unit| {

@@ -60,7 +60,7 @@ pub static OFFSET: Kind = Kind {
 pub static DRIFT: Kind = Kind {
     name: "drift",
     title: "drift of the zero",
-    words: "its zero wanders with session time",
+    words: "its zero drifts with session time",
     equation: "y = x + offset + per_session t/session, t since the session began",
     usual: &[Side::Output],
     parameters: |e, unit| {

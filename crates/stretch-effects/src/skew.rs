@@ -136,7 +136,7 @@ impl Reading {
 pub static DELAY: Kind = Kind {
     name: "delay",
     title: "a delay",
-    words: "it acts a dead time later",
+    words: "it acts after a dead time",
     equation: "y(t) = x(t - delay_s), and (1 - empty) x(0) before x(0) arrives",
     usual: &[Side::Input],
     parameters: |e, _| {
@@ -164,7 +164,7 @@ pub static DELAY: Kind = Kind {
 pub static SKEW: Kind = Kind {
     name: "skew",
     title: "a time offset",
-    words: "it is sampled earlier or later than the rest, by a clock of its own",
+    words: "it is sampled earlier or later than the rest, by a separate clock",
     equation: "y(t) = x(t - skew_s - rate t), t since the trial began",
     usual: &[Side::Output],
     parameters: |e, _| {

@@ -104,7 +104,7 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
     let on = match (seen, judged.len()) {
         (0, 1) => "On a recording that was not used for the fit",
         (0, _) => "On recordings that were not used for the fit",
-        (seen, all) if seen == all => "On the very data of the fit",
+        (seen, all) if seen == all => "On the same recordings as the fit",
         _ => "On recordings of which some were used for the fit",
     };
     format!("{on}, {errors}")

@@ -86,7 +86,9 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
                 format!("Set {}.", listed(&moved))
             }
         }
-        VerdictKind::Unknown => format!("Nothing that the catalogue knows. Look at {place}."),
+        VerdictKind::Unknown => {
+            format!("No effect of the catalogue explains the gap. Look at {place}.")
+        }
         VerdictKind::NoGap => "Nothing.".to_owned(),
         VerdictKind::Record => {
             let what: Vec<&str> = d.gross.iter().map(|g| g.hint.as_str()).take(1).collect();
@@ -135,7 +137,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         VerdictKind::Effect | VerdictKind::Partial => format!("{gain}{}", cheaper(d)),
         VerdictKind::Unknown => format!("The best that the catalogue offers: {gain}"),
         VerdictKind::Record if d.gross.iter().any(Gross::is_plain) => {
-            "A recording from which something can be learnt.".to_owned()
+            "A usable recording.".to_owned()
         }
         VerdictKind::Record => format!("{gain} After that, effects can be seen."),
         VerdictKind::Parameters if d.is_faint() => {

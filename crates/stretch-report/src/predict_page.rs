@@ -18,7 +18,7 @@ pub fn predict_page(prediction: &Prediction) -> String {
     let mut page = Page::new(&format!("Predicted: {}", prediction.name), &prediction.sentence());
     page.facts(&[
         ("Effects of the fix", prediction.effects.join(", ")),
-        ("Error, with over without", number(prediction.ratio, 3)),
+        ("Error with the fix / without it", number(prediction.ratio, 3)),
         ("Largest error", format!("{} times the noise", number(prediction.largest_times_noise, 3))),
     ]);
     page.list(&prediction.notes);

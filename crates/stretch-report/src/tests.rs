@@ -213,7 +213,7 @@ fn the_first_sentence_says_what_the_numbers_say() {
     // a page about the data of the fit states this, whatever the caller claims
     let same = Made::new(&[recording("monday", 1.1, 4000)])
         .page(&Context { tested_on: Vec::new(), ..context("") });
-    assert!(sentence(&same).starts_with("On the very data of the fit"));
+    assert!(sentence(&same).starts_with("On the same recordings as the fit"));
     assert!(same.contains("which flatters every method"));
 }
 

@@ -79,7 +79,7 @@ pub(crate) fn turn_figure(subject: &Subject<'_>, stage: usize, shown: &Shown) ->
         "parameters": turned,
     });
     let frame = FigureSize { width: 400, height: PANEL * responses.parameters.len() as u32 };
-    let figure = Figure::new("What is left on the test trials against every number of the effect")
+    let figure = Figure::new("Remaining error on the test trials against each effect parameter")
         .draw(frame, |area| {
             let mut rest = area.clone();
             for ((one, curve), x) in responses.parameters.iter().zip(&curves).zip(&spans) {

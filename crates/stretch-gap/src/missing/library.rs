@@ -25,8 +25,8 @@ use Factor::{
 };
 use RateForm::{Linear, Magnitude, Rising, Sign, SignedRoot, SignedSquare, Square, Striction};
 
-/// Half-widths of plays, and widths of the exponentials in x and in the travel since a reversal, as shares of the
-/// range.
+/// Half-widths of plays, and widths of the exponentials in x and in the travel since a reversal, as
+/// shares of the range.
 const WIDTHS: [f64; 5] = [0.015, 0.04, 0.1, 0.2, 0.4];
 /// Quantiles of the signal at which knees lie.
 const QUANTILES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];

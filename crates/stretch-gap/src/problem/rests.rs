@@ -45,7 +45,7 @@ impl Noise {
     /// let output: Vec<f64> = steps.iter().map(|x| 2.0 * x + 0.05 * random.gauss()).collect();
     /// let noise = Noise::of_rests(&output, &[&steps], &[0..3000], 0.01).unwrap();
     /// assert!((noise.sd() / 0.05 - 1.0).abs() < 0.1);
-    /// assert_eq!(noise.source(), "rests of the recording: 19.2 s in which the inputs stand still");
+    /// assert_eq!(noise.source(), "rests of the recording: 19.2 s in which the inputs are constant");
     /// assert_eq!(Noise::of_rests(&output, &[&output], &[0..3000], 0.01), None);
     /// ```
     pub fn of_rests(
@@ -64,7 +64,7 @@ impl Noise {
         let mean = kept.iter().sum::<f64>() / kept.len() as f64;
         let seconds = (kept.len() * PART) as f64 * dt_s;
         let source =
-            format!("rests of the recording: {seconds:.1} s in which the inputs stand still");
+            format!("rests of the recording: {seconds:.1} s in which the inputs are constant");
         let known_to = (2.0 * TOGETHER / (kept.len() * PART).max(1) as f64).sqrt();
         (kept.len() >= FEWEST && mean > 0.0).then(|| Self::white(mean.sqrt(), source, known_to))
     }

@@ -42,7 +42,7 @@ fn still() -> [(&'static str, &'static str, f64, Points, bool); 2] {
     [
         (
             "gauge_blocks",
-            "Hold the gauge at known lengths with blocks: the reference is then the blocks', not the recorder's.",
+            "Hold the gauge at known lengths with blocks, which replace the recorded reference.",
             3.0,
             begin(&[[block(0.1), block(0.5), block(0.9), block(0.5), block(0.1)].concat()]),
             true,

@@ -182,14 +182,14 @@ impl Experiment {
             .collect();
         let blocks = Self::held(
             "gauge_blocks",
-            "Set three lengths with gauge blocks: the reference is then the blocks', not the potentiometer's.",
+            "Set three lengths with gauge blocks, which replace the potentiometer as the reference.",
             3.0,
             blocks.clone(),
             vec![0.0; blocks.len()],
         );
         let mut shunt = Self::held(
             "shunt_step",
-            "At rest, switch a shunt across the bridge on and off: only what is electrical answers.",
+            "At rest, switch a shunt across the bridge on and off: only electrical effects respond.",
             1.0,
             vec![at(1.0); seconds(8.0)],
             vec![0.0; seconds(8.0)],

@@ -163,7 +163,7 @@ fn dead_band_sketch(valves: &[DeadBand; 2]) -> Sketch {
         {gated}
         end"
     );
-    let side = "0 at the inlet, 1 at the outlet; each has a state of its own";
+    let side = "0 at the inlet, 1 at the outlet; each has a separate state";
     let mut sketch = Sketch::of(Quantity::new("u", "1", "commanded opening, 0 to 1"), body)
         .beside(Quantity::new("side", "1", side))
         .giving(Quantity::new("y", "1", "opening after the dead band"))
@@ -237,7 +237,7 @@ fn leak_sketch([c, power]: [f64; 2]) -> Sketch {
         y = C * p * max(0, {shape})
         end"
     );
-    let flow = "mass flow out of the chamber; less it from the net inflow of m' = q_in - q_out";
+    let flow = "mass flow out of the chamber; subtract it from m' = q_in - q_out";
     Sketch::of(Quantity::new("p", "Pa", "pressure in the chamber above the atmosphere"), body)
         .giving(Quantity::new("y", "kg/s", flow))
         .with_all(&[("C", c, "kg/(s Pa)"), ("POWER", power, "1"), ("P_AT", AT_PA, "Pa")])
@@ -258,7 +258,7 @@ pub(super) static CHAMBER_VOLUME: Effect = Effect {
         action: |values, _| Action::Volume(Box::new(Growth { g: values[0], bend: values[1] })),
         sketch: Some(|v, _| {
             let body = "let y = 1 + G * x * (1 + BEND * (1 - x))";
-            let volume = "V/V0; p = m R T/V then has the p dV/dt term in it";
+            let volume = "V/V0; p = m R T/V then contains the p dV/dt term";
             Sketch::of(Quantity::new("x", "1", "contraction k/k_max"), body)
                 .giving(Quantity::new("y", "1", volume))
                 .with_all(&[("G", v[0], "1"), ("BEND", v[1], "1")])

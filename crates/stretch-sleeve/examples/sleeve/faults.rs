@@ -57,7 +57,7 @@ pub(crate) fn print(judge: &Judge, every: usize) -> anyhow::Result<()> {
         }
     }
     println!(
-        "\n### Lost channels\n\n| fault | cases | found within 100 ms | cases in which it matters | found within 100 ms of that | another one blamed | error to that without the channel, median | 0.95 quantile |"
+        "\n### Lost channels\n\n| fault | cases | found within 100 ms | cases in which it matters | found within 100 ms of that | another one excluded | error / error without the channel, median | 0.95 quantile |"
     );
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     for (fault, mut own) in FAULTS.iter().zip(found) {

@@ -148,7 +148,7 @@ fn table(title: &str, counts: &Counts) {
         counts.cases.len()
     );
     println!(
-        "| mean error from | gauges | told | on the right side | told less mean error, median |"
+        "| mean error from | gauges | reported | with the right sign | reported - mean error, median |"
     );
     println!("| --- | --- | --- | --- | --- |");
     for pair in LARGE.windows(2) {
@@ -162,17 +162,17 @@ fn table(title: &str, counts: &Counts) {
     for told in [true, false] {
         let own = counts.cases.iter().filter(|c| c.told == told).map(|c| c.bias.abs());
         let own: Vec<f64> = own.collect();
-        println!("told {told}: {} of median mean error {:.2}", own.len(), median(own));
+        println!("reported {told}: {} gauges, median of the mean errors {:.2}", own.len(), median(own));
     }
     for [from, to] in [[0.0, 4.0], [4.0, 8.0], [8.0, f64::INFINITY]] {
         let cases: Vec<&Case> =
             counts.cases.iter().filter(|c| (from..to).contains(&c.limit)).collect();
         let told = cases.iter().filter(|case| case.told).count();
         let off = median(cases.iter().filter_map(|c| Some((c.off? - c.shift).abs())).collect());
-        println!("limit from {from}: {told} of {} told, told less shift {off:.2}", cases.len());
+        println!("limit from {from}: {told} of {} reported, reported - shift {off:.2}", cases.len());
     }
     let ratios: Vec<f64> = counts.cases.iter().map(|c| (c.rmse[1] / c.rmse[0]).ln()).collect();
     let mean = (ratios.iter().sum::<f64>() / ratios.len() as f64).exp();
     let worst = ratios.iter().copied().fold(f64::MIN, f64::max).exp();
-    println!("followed: RMSE to that without, geometric mean {mean:.3}, worst {worst:.2}");
+    println!("RMSE with a followed zero / without, geometric mean {mean:.3}, worst {worst:.2}");
 }

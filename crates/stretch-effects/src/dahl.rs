@@ -144,7 +144,7 @@ pub static LOAD_DAHL_FRICTION: Kind = Kind {
 pub static PLAY_FRICTION: Kind = Kind {
     name: "play_friction",
     title: "friction behind a play",
-    words: "its friction depends on position after a gap is closed: play and friction in series",
+    words: "its friction depends on position, behind a gap: play and friction in series",
     equation: "y = x + f u behind the stage, x - f u in front of it; du = dz/s (1 - u sign(dz)), z = play(p, w), p the position",
     beside: Beside::Position,
     parameters: |e, unit| {

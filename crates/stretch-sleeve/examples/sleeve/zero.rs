@@ -162,7 +162,7 @@ fn table(title: &str, counts: &Counts) {
     for told in [true, false] {
         let own = counts.cases.iter().filter(|c| c.told == told).map(|c| c.bias.abs());
         let own: Vec<f64> = own.collect();
-        println!("reported {told}: {} gauges, median of the mean errors {:.2}", own.len(), median(own));
+        println!("reported {told}: {} gauges, median mean error {:.2}", own.len(), median(own));
     }
     for [from, to] in [[0.0, 4.0], [4.0, 8.0], [8.0, f64::INFINITY]] {
         let cases: Vec<&Case> =

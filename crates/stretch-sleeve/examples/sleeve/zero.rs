@@ -169,7 +169,7 @@ fn table(title: &str, counts: &Counts) {
             counts.cases.iter().filter(|c| (from..to).contains(&c.limit)).collect();
         let told = cases.iter().filter(|case| case.told).count();
         let off = median(cases.iter().filter_map(|c| Some((c.off? - c.shift).abs())).collect());
-        println!("limit from {from}: {told} of {} reported, reported - shift {off:.2}", cases.len());
+        println!("limit from {from}: {told} of {} reported, wrong by {off:.2}", cases.len());
     }
     let ratios: Vec<f64> = counts.cases.iter().map(|c| (c.rmse[1] / c.rmse[0]).ln()).collect();
     let mean = (ratios.iter().sum::<f64>() / ratios.len() as f64).exp();

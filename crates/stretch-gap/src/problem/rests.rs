@@ -29,8 +29,8 @@ const FEWEST: usize = 6;
 const MOVES: f64 = 3.0;
 /// Order of the differences, and the sum of their squared weights.
 const ORDER: (usize, f64) = (6, 924.0);
-/// Sum of the squared correlations of sixth differences over all lags, 24!/(12! 12!)/924^2 = 3.2.
-/// So many neighbouring differences carry the information of one independent sample.
+/// Sum of the squared correlations of sixth differences over all lags, 24!/(12! 12!)/924^2 = 3.2. This number of
+/// neighbouring differences carries the information of one independent sample.
 const TOGETHER: f64 = 2_704_156.0 / (924.0 * 924.0);
 
 impl Noise {

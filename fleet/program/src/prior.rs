@@ -69,7 +69,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let is_judged = |e: &&Expected| e.rmse_known.or(e.rmse_new).is_some();
     for Expected { seconds, rmse_known, rmse_new, .. } in prior.expected.iter().filter(is_judged) {
         let (known, new) = (number(*rmse_known), number(*rmse_new));
-        say(format!("  after {seconds:>2} s of reference: {known} for a known {whole}, {new} for a new one"))?;
+        say(format!(
+            "  after {seconds:>2} s of reference: known {whole} {known}, new {whole} {new}"
+        ))?;
     }
     let (out, count) = (args.out.display(), prior.sessions);
     let path = LEVELS[above..].join("/").to_uppercase();

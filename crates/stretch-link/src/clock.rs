@@ -10,7 +10,9 @@ use crate::{Event, Frame};
 ///
 /// If samples are two or more milliseconds apart, a frame with the same millisecond as the previous
 /// frame has no time, because the board's clock has stopped and no time is invented. Faster samples
-/// share a millisecond; their times are 1 us apart, which keeps their order.
+/// share a millisecond; their times are 1 us apart, which keeps their order. The next millisecond
+/// counts from the first of them, so the time line does not run fast. After 1,000 frames with the
+/// same millisecond the clock has stopped.
 ///
 /// ```
 /// use stretch_link::{Answer, Event, Frame, TimeLine};
@@ -22,6 +24,12 @@ use crate::{Event, Frame};
 /// assert_eq!(line.time_s(&Event::Damaged, 9.02), None);
 /// assert_eq!(line.time_s(&Event::Frame(frame(0)), 9.02), None);
 /// assert_eq!(line.time_s(&Event::Frame(frame(10)), 9.03), Some(2.02));
+///
+/// let mut fast = TimeLine::new(0.0005);
+/// let times_s = [0, 0, 1, 1, 2].map(|ms| fast.time_s(&Event::Frame(frame(ms)), 0.0));
+/// assert_eq!(times_s, [0.0, 1e-6, 1e-3, 1.001e-3, 2e-3].map(Some));
+/// let stopped = (0..1000).map(|_| fast.time_s(&Event::Frame(frame(2)), 0.0));
+/// assert_eq!(stopped.filter(Option::is_some).count(), 999);
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeLine {
@@ -33,6 +41,8 @@ pub struct TimeLine {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Last {
     board_ms: u32,
+    /// Time of the first frame with this millisecond.
+    began_s: f64,
     time_s: f64,
     heard_s: f64,
 }
@@ -53,20 +63,28 @@ impl TimeLine {
     /// board's clock has stopped.
     pub fn time_s(&mut self, event: &Event, now_s: f64) -> Option<f64> {
         let Frame { time_ms: board_ms, .. } = event.frame()?;
+        // sums of steps carry rounding errors
+        let rounded = |time_s: f64| libm::round(time_s * 1e6) / 1e6;
+        let mut began_s = None;
         let time_s = match self.last {
             None => 0.0,
             Some(last) if matches!(event, Event::Restarted(_)) => {
-                last.time_s + (now_s - last.heard_s).max(self.period_s)
+                rounded(last.time_s + (now_s - last.heard_s).max(self.period_s))
             }
             Some(last) => match board_ms.wrapping_sub(last.board_ms) {
-                0 if self.period_s >= APART_S => return None,
-                0 => last.time_s + 1e-6,
-                step_ms => last.time_s + f64::from(step_ms) / 1e3,
+                0 => {
+                    let next_s = rounded(last.time_s + 1e-6);
+                    if self.period_s >= APART_S || next_s >= rounded(last.began_s + 1e-3) {
+                        return None;
+                    }
+                    began_s = Some(last.began_s);
+                    next_s
+                }
+                step_ms => rounded(last.began_s + f64::from(step_ms) / 1e3),
             },
         };
-        // sums of steps carry rounding errors
-        let time_s = libm::round(time_s * 1e6) / 1e6;
-        self.last = Some(Last { board_ms, time_s, heard_s: now_s });
+        let began_s = began_s.unwrap_or(time_s);
+        self.last = Some(Last { board_ms, began_s, time_s, heard_s: now_s });
         Some(time_s)
     }
 }

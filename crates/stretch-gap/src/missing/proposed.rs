@@ -152,7 +152,7 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
     let v = |s: usize| format!("v[{}]", signals[s].name);
     let raised = |what: String, p: f64| if p == 1.0 { what } else { format!("{what}^{p}") };
     match factor {
-        Factor::Power { signal, power } => raised(x(signal), power),
+        Factor::Power { signal, power } => raised(format!("max(0, {})", x(signal)), power),
         Factor::Centred { signal, at, power } => {
             raised(format!("({} - {})", x(signal), three_digits(at)), f64::from(power))
         }
@@ -162,9 +162,11 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
         Factor::Below { signal, at, power } => {
             raised(format!("max(0, {} - {})", three_digits(at), x(signal)), power)
         }
-        Factor::Low { signal, width } => format!("exp(-{}/{})", x(signal), three_digits(width)),
+        Factor::Low { signal, width } => {
+            format!("exp(-max(0, {})/{})", x(signal), three_digits(width))
+        }
         Factor::High { signal, width } => {
-            format!("exp(-(1 - {})/{})", x(signal), three_digits(width))
+            format!("exp(-max(0, 1 - {})/{})", x(signal), three_digits(width))
         }
         Factor::Sine { signal, turns } => {
             format!("sin(2 pi {} {})", three_digits(turns), x(signal))

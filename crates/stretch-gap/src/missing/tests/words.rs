@@ -44,7 +44,10 @@ fn an_equation_tells_each_of_its_letters_once() {
         [term(&[x, v], Passage::Direct, 0.0123), term(&[x], Passage::Lag { tau_s: 2.0 }, -1.5)];
     let told = equation("volts", &terms, &signals());
     let (sum, letters) = told.split_once("; ").expect("letters are told");
-    assert_eq!(sum, "volts += 0.0123 V x[rod_mm] |v[rod_mm]| + -1.50 V lag(x[rod_mm], 2.00 s)");
+    assert_eq!(
+        sum,
+        "volts += 0.0123 V max(0, x[rod_mm]) |v[rod_mm]| + -1.50 V lag(max(0, x[rod_mm]), 2.00 s)"
+    );
     assert_eq!(
         letters,
         "x[rod_mm] = (rod_mm - 40.0 mm)/(25.0 mm), v[rod_mm] = (d rod_mm/dt)/(25.0 mm/s)"
@@ -53,7 +56,7 @@ fn an_equation_tells_each_of_its_letters_once() {
     let command = [term(&[Factor::Power { signal: 1, power: 2.0 }], Passage::Direct, 2.0)];
     assert_eq!(
         equation("volts", &command, &signals()),
-        "volts += 2.00 V x[valve]^2; x[valve] = valve"
+        "volts += 2.00 V max(0, x[valve])^2; x[valve] = valve"
     );
     // A term of time alone and an empty sum have no letters to define.
     let clock = [term(&[Factor::Time { power: 0.5 }], Passage::Direct, 2e-9)];
@@ -67,7 +70,7 @@ fn a_sentence_says_which_of_three_it_is() {
     let found = sentence(&proposed(vec![term(&[x], Passage::Direct, 0.5)], false), "V");
     assert_eq!(
         found,
-        "What is missing in gauge may be volts += 0.500 V x[rod_mm]^2: it closes 83 % of what is left there on trials that were not fitted."
+        "What is missing in gauge may be volts += 0.500 V max(0, x[rod_mm])^2: it closes 83 % of what is left there on trials that were not fitted."
     );
     let dense = sentence(&proposed(Vec::new(), false), "V");
     assert!(dense.contains("depends on the recorded signals, but no short sum"), "{dense}");

@@ -129,12 +129,19 @@ fn known(trials: &[(String, Trial)], first: &Trial) -> Vec<Known> {
             let all = || trials.iter().filter_map(|(_, t)| t.channel(&name));
             let held: usize = all().map(|v| v.windows(2).filter(|w| w[0] == w[1]).count()).sum();
             let samples: usize = all().map(<[f64]>::len).sum();
-            let low = name.to_lowercase();
-            let is_called = COMMANDS.iter().any(|word| low.contains(word)) || low.starts_with("u_");
+            let is_called = is_called(&name);
             let is_held = 2 * held > samples;
             Known { range: ends(all().flatten()).into(), is_called, is_held, name }
         })
         .collect()
+}
+
+/// Whether a name is like that of a command. `action` is also the end of other words: contraction, reaction.
+fn is_called(name: &str) -> bool {
+    let low = name.to_lowercase();
+    let begins = |at: usize| !low[..at].ends_with(char::is_alphabetic);
+    let has = |word: &&str| low.match_indices(*word).any(|(at, _)| *word != "action" || begins(at));
+    COMMANDS.iter().any(has) || low.starts_with("u_")
 }
 
 fn quoted(text: &str) -> String {
@@ -313,8 +320,7 @@ mod tests {
     use super::*;
 
     fn column(name: &str, is_held: bool) -> Known {
-        let is_called = COMMANDS.iter().any(|word| name.contains(word));
-        Known { name: name.into(), range: [0.0, 1.0], is_called, is_held }
+        Known { name: name.into(), range: [0.0, 1.0], is_called: is_called(name), is_held }
     }
 
     #[test]
@@ -346,6 +352,12 @@ mod tests {
         ] {
             let text = of(&[column(columns[0], true), column(columns[1], false)]);
             assert!(text.contains(line), "{text}");
+        }
+        for (command, output) in [("action_0", "reaction_force_n"), ("torqueCmd", "contraction_mm")]
+        {
+            let text = of(&[column(command, false), column(output, false)]);
+            assert!(text.contains(&format!("output = \"{output}\"\n")), "{text}");
+            assert!(text.contains(&format!("inputs = [\"{command}\"]")), "{text}");
         }
         let measured = of(&[column("torque_nm", false), column("angle_rad", false)]);
         assert!(measured.contains("inputs = [\"torque_nm\"]"), "{measured}");

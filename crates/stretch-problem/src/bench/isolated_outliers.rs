@@ -7,16 +7,16 @@
 //! ```
 //!
 //! The sample is an outlier if |d_i| exceeds two limits: eight standard deviations of d over the recording plus half of
-//! the greater of the steps x_(i-1) - x_(i-2) and x_(i+2) - x_(i+1), and 1.25 times |d| of either neighbour. Therefore
-//! a step of the motion is no outlier, and neither is a kink from rest. A sharp reversal at nearly equal speeds stays
-//! below the limit only because of the noise. An outlier is replaced by the value of the cubic.
+//! the greatest of the steps x_(i-1) - x_(i-2) and x_(i+2) - x_(i+1) and of their difference, and 1.25 times |d| of
+//! either neighbour. Therefore a step of the motion is no outlier, and neither is a kink from rest or a sharp reversal.
+//! An outlier is replaced by the value of the cubic.
 
 use stretch_data::SessionTrial;
 
 /// Standard deviations beyond which a sample is an outlier.
 const OUTLIER: f64 = 8.0;
-/// Share of the greater of the two steps beside the sample that is added to the limit. A kink from rest gives a |d| of
-/// a third of that step.
+/// Share of the greatest of the steps before and after the sample, and of their difference, that is added to the limit.
+/// A kink gives a |d| of a third of that difference.
 const KINK: f64 = 0.5;
 /// Smallest ratio of the |d| of an outlier to the |d| of its neighbours. A step of the motion gives a ratio of 1, a
 /// single outlier a ratio of 3/2.
@@ -51,7 +51,8 @@ fn replace_outliers(values: &mut [f64]) -> usize {
     let mut outliers = Vec::new();
     for i in 1..off.len().saturating_sub(1) {
         let x = &values[i..i + 5];
-        let motion = (x[1] - x[0]).abs().max((x[4] - x[3]).abs());
+        let (before, after) = (x[1] - x[0], x[4] - x[3]);
+        let motion = before.abs().max(after.abs()).max((after - before).abs());
         let beside = off[i - 1].abs().max(off[i + 1].abs());
         let size = off[i].abs();
         if size > OUTLIER * sd + KINK * motion && size > STEP * beside {
@@ -82,33 +83,35 @@ mod tests {
     use stretch_gap::RandomGenerator;
 
     /// Ramps with kinks and a step, in noise.
-    fn motion() -> Vec<f64> {
+    fn motion(slope: f64) -> Vec<f64> {
         let mut random = RandomGenerator::new(3, 0);
         let ramp =
             |i: usize| if i % 200 < 100 { (i % 200) as f64 } else { 200.0 - (i % 200) as f64 };
         (0..4000)
-            .map(|i| ramp(i) + f64::from(u8::from(i > 2050)) * 50.0 + 0.1 * random.gauss())
+            .map(|i| slope * ramp(i) + f64::from(u8::from(i > 2050)) * 50.0 + 0.1 * random.gauss())
             .collect()
     }
 
     #[test]
     fn kinks_steps_and_noise_are_left_alone() {
-        let mut values = motion();
-        assert_eq!(replace_outliers(&mut values), 0);
-        assert_eq!(values, motion());
+        for slope in [1.0, 30.0] {
+            let mut values = motion(slope);
+            assert_eq!(replace_outliers(&mut values), 0, "{slope}");
+            assert_eq!(values, motion(slope));
+        }
         assert_eq!(replace_outliers(&mut vec![1.0; 100]), 0);
         assert_eq!(replace_outliers(&mut [1.0, 2.0]), 0);
     }
 
     #[test]
     fn single_values_far_off_are_replaced() {
-        let mut values = motion();
+        let mut values = motion(1.0);
         let places = [7, 330, 1850, 3990];
         for (place, size) in places.into_iter().zip([5.0, -3.0, 20.0, 1e6]) {
             values[place] += size;
         }
         assert_eq!(replace_outliers(&mut values), places.len());
-        for (value, clean) in values.iter().zip(motion()) {
+        for (value, clean) in values.iter().zip(motion(1.0)) {
             approx::assert_abs_diff_eq!(*value, clean, epsilon = 0.5);
         }
     }

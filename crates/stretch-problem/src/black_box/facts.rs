@@ -29,14 +29,15 @@ pub(super) fn facts(
     }
 }
 
-/// The inputs of the stages, each once.
+/// The inputs of the stages, each once. The output of another stage is measured, even if a coarse encoder holds it.
 fn signals(session: &RecordedSession) -> Vec<Recorded> {
     let mut out: Vec<Recorded> = Vec::new();
     for name in session.stages.iter().flat_map(|s| &s.inputs) {
         let column = session.columns.iter().find(|c| c.name == *name);
         if let Some(column) = column.filter(|_| out.iter().all(|r| r.name != *name)) {
             out.push(Recorded {
-                is_command: is_command(&column.values),
+                is_command: session.stages.iter().all(|s| s.output != *name)
+                    && is_command(&column.values),
                 ..Recorded::measured(name, &column.unit, column.values.clone())
             });
         }
@@ -73,4 +74,34 @@ fn record_columns(about: &Description, session: &RecordedSession) -> Vec<Column<
 fn is_command(values: &[f64]) -> bool {
     let held = values.windows(2).filter(|w| w[0] == w[1]).count();
     10 * held >= values.len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::black_box::source::{SessionColumn, SessionStage};
+
+    #[test]
+    fn a_coarse_output_of_another_stage_is_no_command() {
+        let stage = |input: &str, output: &str| SessionStage {
+            name: output.into(),
+            output: output.into(),
+            inputs: vec![input.into()],
+        };
+        let coarse = |name: &str| SessionColumn {
+            name: name.into(),
+            unit: "deg".into(),
+            values: (0..100).map(|i| f64::from(i / 4)).collect(),
+        };
+        let session = RecordedSession {
+            dt_s: 0.01,
+            trials: Vec::new(),
+            stages: vec![stage("command", "motor_deg"), stage("motor_deg", "load_deg")],
+            parameters: Vec::new(),
+            effects: Vec::new(),
+            columns: ["command", "motor_deg", "load_deg"].map(coarse).into(),
+        };
+        let commands: Vec<bool> = signals(&session).iter().map(|s| s.is_command).collect();
+        assert_eq!(commands, [true, false]);
+    }
 }

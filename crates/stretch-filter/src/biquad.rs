@@ -12,6 +12,7 @@ use stretch_core::{Design, DesignError, Real, Stage};
 ///
 /// The signs are those of SciPy and MATLAB (`sos` rows with a0 = 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[allow(missing_docs)]
 pub struct BiquadSpec {
     pub b0: f64,

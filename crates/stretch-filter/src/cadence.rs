@@ -34,6 +34,7 @@ pub struct CadenceMemory {
 
 /// Relation of a time stamp to the one before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Arrival {
     /// The first time stamp.

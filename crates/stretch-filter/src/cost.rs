@@ -5,6 +5,7 @@
 /// On a core without a floating-point unit, multiply these by the cost of a soft-float operation to
 /// get the cost of a step. On a Cortex-M3 a product takes about 50 instructions, a sum about 80.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub struct Cost {
     /// Products per sample.

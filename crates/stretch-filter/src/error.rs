@@ -5,6 +5,7 @@ use stretch_core::DesignError;
 
 /// The reason why a filter design was refused, or a log could not be processed.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FilterError {
     /// A number of the design is out of range.

@@ -9,6 +9,7 @@ pub const MAX_ORDER: usize = 8;
 
 /// Specification of a low-pass filter.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LowPassSpec {
     /// Frequency at which the gain is 1/sqrt(2) (-3 dB): above zero and below half the sample rate.
     pub cutoff: Hertz,

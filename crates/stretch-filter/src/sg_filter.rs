@@ -9,6 +9,7 @@ const BLOCK: usize = 256;
 
 /// The shape of a [`SgFilter`], all in samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SgShape {
     /// Samples in the fit of the polynomial.
     pub window: usize,

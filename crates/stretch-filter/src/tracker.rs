@@ -6,6 +6,7 @@ use stretch_core::{Design, DesignError, Real, SampleRate, Stage};
 /// Specification of a tracker: the signal's acceleration relative to the noise, and the sample
 /// rate.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TrackerSpec {
     /// lambda = sigma_acceleration T^2 / sigma_measurement, from 1e-6 to 1e6, dimensionless, where
     /// T is the sample period. It compares the motion due to the acceleration in one sample with
@@ -52,6 +53,7 @@ pub struct Tracker<T> {
 
 /// Output of a [`Tracker`].
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Track<T> {
     /// The value, in the sample's unit.
     pub value: T,

@@ -7,6 +7,7 @@ use crate::{Fit, FitError};
 
 /// A value and the bounds around it.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Bounds<T> {
     /// Lower bound.
     pub lower: T,

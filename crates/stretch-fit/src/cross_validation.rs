@@ -8,6 +8,7 @@ use crate::{Factor, FitError};
 
 /// The errors on one trial of the surface that was fitted on all other trials.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct HeldOut<T> {
     /// Index of the trial in the slice.
     pub trial: usize,

@@ -4,6 +4,7 @@ use core::fmt;
 
 /// The reason why a sample or a fit was refused, with the offending values.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum FitError {
     /// A sample that is NaN, infinite, or so large that its powers would

@@ -30,6 +30,7 @@ pub struct OrderRow<T> {
 
 /// A difference of two orders' cross-validated mean squared errors, over trials.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Excess<T> {
     /// Mean over trials.
     pub mean: T,

@@ -6,6 +6,7 @@ use crate::{Fit, FitError, Sample, SurfaceAccumulator};
 
 /// Loss function of a robust fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Loss {
     /// Tukey's bisquare with tuning constant 4.685. It is close to least squares for small
     /// residuals (95 % efficiency on normal errors), and ignores residuals beyond 4.685 robust

@@ -4,6 +4,7 @@
 ///
 /// The numbers may have any units.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Sample<T> {
     /// Rate of the signal; has no effect on a surface of degree 0 in the rate.
     pub rate: T,

@@ -4,6 +4,7 @@ use crate::{Frame, frame::Refused, recent::Recent};
 
 /// The result of a byte that completes or breaks off a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Event {
     /// The next frame in the order of the counter. Each frame is given once.
     Frame(Frame),
@@ -38,6 +39,7 @@ impl Event {
 
 /// Counts of received, lost and skipped frames.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counts {
     /// Frames that were decoded and returned.
     pub frames: u64,

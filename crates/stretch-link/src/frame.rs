@@ -13,6 +13,7 @@ const CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISCSI);
 
 /// The content of the line that a board sends for one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Frame {
     /// Sample counter: 0 after a reset, then one more per sample; wraps.
     pub counter: u32,
@@ -26,6 +27,7 @@ pub struct Frame {
 
 /// The answer of the receptor for one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Answer {
     /// An estimate.
     Reading {

@@ -9,6 +9,7 @@ use crate::{
 
 /// The range by which an error is divided to give a percentage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Delta {
     /// The range of the estimate: delta in equation 1 of the published method ("the paper").
     Estimate,
@@ -50,6 +51,7 @@ pub struct Agreement<T> {
 /// The numbers of an [`Agreement`], for storage or transmission. [`Agreement::from_spec`] converts
 /// them back.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AgreementSpec<T> {
     /// Number of accepted pairs.
     pub count: u64,

@@ -4,6 +4,7 @@ use core::fmt;
 
 /// The reason why a metric cannot be computed, with the offending values.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum MetricsError {
     /// Fewer samples (or blocks) than the metric needs.

@@ -6,6 +6,7 @@ use crate::MetricsError;
 
 /// The lag at which the correlation of truth and estimate is greatest.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lag {
     /// Number of samples by which the estimate lags the truth, interpolated by a parabola; negative
     /// if it leads. Multiply by the sampling interval to get seconds.

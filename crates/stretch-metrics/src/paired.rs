@@ -36,6 +36,7 @@ pub struct PairedT<T> {
 
 /// Result of a paired t test.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct TTest {
     /// Number of pairs or blocks.
     pub count: u64,

@@ -23,6 +23,7 @@ fn is_usable<T: Real>(sample: T) -> bool {
 
 /// Why a channel is excluded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ArrayLoss {
     /// The channel's samples are missing.
@@ -37,6 +38,7 @@ pub enum ArrayLoss {
 
 /// A reading of an [`ArrayReceptor`](crate::ArrayReceptor).
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ArrayReading<T> {
     /// The estimated reference, in its unit.
     pub estimate: T,
@@ -57,6 +59,7 @@ impl<T> ArrayReading<T> {
 
 /// Why there is no [`ArrayReading`] for a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ArrayWithheld {
     /// A channel in use has not had a sample yet.

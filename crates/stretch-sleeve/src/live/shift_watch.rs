@@ -67,6 +67,7 @@ pub struct ShiftMemory<T, const N: usize> {
 
 /// Result for every gauge at the end of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Shifts<T, const N: usize> {
     /// Deviation of each gauge from the prediction of the others, in the reference's unit. It is a
     /// lower bound, because states outside their domains are clamped.

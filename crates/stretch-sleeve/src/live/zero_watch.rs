@@ -166,6 +166,7 @@ pub struct ZeroMemory<T> {
 
 /// Result for the zero at the end of a movement.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Zero<T> {
     /// Deviation of the zero from that of the calibration, in the signal's unit.
     pub off: T,

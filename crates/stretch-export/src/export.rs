@@ -167,7 +167,7 @@ fn fixed(calibration: &Calibration, options: &Options) -> Result<Header, ExportE
         _ => ExportError::NoFixedForm(error),
     })?;
     let part = match &record.numbers {
-        RecordNumbers::Rated(numbers) => surfaces_fixed(numbers),
+        RecordNumbers::Rated(numbers) => surfaces_fixed(numbers, calibration.spec().sample_rate_hz),
         RecordNumbers::Observer(numbers) => observer_fixed(numbers),
     };
     let test = self_test::fixed(calibration, &options.adc, &record)?;

@@ -1,5 +1,6 @@
 /* Answers every sample of standard input (32 bits in hexadecimal, x for one that did not come); where
- * the header takes a pressure, that comes before each. */
+ * the header takes a pressure, that comes before each. Where it can load a calibration: load, the bytes of a record and
+ * a dot, which is answered by the result. */
 #include "stretch.h"
 
 #include <stdio.h>
@@ -33,6 +34,18 @@ int main(void)
         uint32_t bits = (uint32_t)strtoul(word, NULL, 16);
         stretch_reading reading;
         uint32_t rate = 0, sd = 0;
+#ifdef STRETCH_CAN_LOAD
+        if (strcmp(word, "load") == 0) {
+            uint8_t record[600];
+            size_t size = 0;
+            while (scanf("%15s", word) == 1 && word[0] != '.' && size < sizeof record) {
+                record[size++] = (uint8_t)strtoul(word, NULL, 16);
+            }
+            printf("load %u\n", (unsigned)stretch_load(record, size));
+            stretch_init(&state);
+            continue;
+        }
+#endif
 #ifdef FLOAT
         float volts;
 #ifdef STRETCH_TAKES_PRESSURE

@@ -2,19 +2,25 @@
 
 mod compilers;
 
-use std::{fmt::Write as _, fs, path::PathBuf, process::Command};
+use std::{
+    fmt::Write as _,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 use compilers::{Compiler, compiled, compiler, gcc_and_gxx, on_uno, run, simulated, strict_c, uno};
 
 use stretch_calibrate::{BoardReceptor, fixed_record, parse_adc, read_calibration};
 use stretch_core::{
     Calibration, CalibrationSpec, Crosstalk, Degree, Design, DiagnosedMap, Interval, Knee, Model,
-    ObserverMap, Plays, Polarity, RateEstimator, RestTracker, Stage, Surface, Target, Values,
-    Volts, Worn,
+    Normalisation, ObserverMap, Plays, Polarity, Range, RangeSpec, RateEstimator, RestTracker,
+    Stage, Surface, Target, Values, Volts, Worn, record,
 };
 use stretch_export::{Form, HEADER, Options, arduino_library, array_header, gauge_header, header};
 use stretch_receptor::{
-    Receptor, Withheld, code::Adc, code::AdcCode, example_diagnosed, example_observer,
+    Receptor, Withheld, code::Adc, code::AdcCode, code::CodeMap, code::FixedCalibration,
+    example_diagnosed, example_observer,
 };
 use stretch_sleeve::{GaugeCalibration, SleeveCalibration, Turns, Zero, ZeroWatch};
 
@@ -215,6 +221,156 @@ fn same(what: &str, found: &str, expected: &str) -> usize {
         assert_eq!(found, expected, "{what}: sample {n}");
     }
     found.lines().count()
+}
+
+/// Returns the line with which the harness loads a record.
+fn loading(record: &[u8]) -> String {
+    let bytes: String = record.iter().map(|byte| format!("{byte:x} ")).collect();
+    format!("load {bytes}.\n")
+}
+
+fn record_of(calibration: &Calibration, adc: &Adc) -> Vec<u8> {
+    fixed_record(calibration, adc).unwrap().bytes
+}
+
+/// Replaces the checksum of a record by the right one.
+fn sealed(mut record: Vec<u8>) -> Vec<u8> {
+    let body = record.len() - 4;
+    let seal = record::checksum(&record[..body]).to_le_bytes();
+    record[body..].copy_from_slice(&seal);
+    record
+}
+
+/// A header, a record that it can load, and records that it must refuse, each with its answer.
+type Loads = (Calibration, Calibration, Vec<(Vec<u8>, u8)>);
+
+fn loads() -> [Loads; 2] {
+    let linear = read_calibration(&firmware("linear.postcard")).unwrap();
+    let poly13 = read_calibration(&firmware("poly13.postcard")).unwrap();
+    [(&poly13, &linear), (&linear, &poly13)].map(|(own, other)| {
+        let loaded = changed(own, |spec| {
+            spec.polarity = Polarity::Falling;
+            spec.dead_band *= 3.0;
+            let (mode, min) = (Normalisation::MinMax, spec.signal_range.min() + 0.05);
+            let range = RangeSpec { mode, zero: 0.0, min, max: spec.signal_range.max() };
+            spec.signal_range = Range::new(range).unwrap();
+        });
+        let good = record_of(&loaded, &adc());
+        let with = |at: usize, byte: u8| {
+            let mut bytes = good.clone();
+            bytes[at] = byte;
+            bytes
+        };
+        let slow = changed(own, |spec| spec.sample_rate_hz = 50.0.try_into().unwrap());
+        let long = changed(own, |spec| {
+            spec.rate_estimator = RateEstimator::SavitzkyGolay { window: 21, degree: 2, delay: 0 };
+        });
+        let refused = vec![
+            (vec![], 1),
+            (vec![0xff; 256], 1),
+            (vec![0; 256], 2),
+            (with(20, good[20] ^ 1), 2),
+            (good[..good.len() - 1].to_vec(), 2),
+            (sealed(with(0, 3)), 3),
+            (with(0, 1), 3),
+            (sealed([&good[..], &[0]].concat()), 4),
+            (record_of(other, &adc()), 4),
+            (record_of(&example_observer(), &adc()), 4),
+            (record_of(own, &parse_adc("10,0,3.3").unwrap()), 4),
+            (record_of(&slow, &adc()), 4),
+            (record_of(&long, &adc()), 4),
+        ];
+        (own.clone(), loaded, refused)
+    })
+}
+
+/// A header loads the record of another calibration and then gives the bits of that calibration. A record that is
+/// refused replaces nothing.
+#[test]
+fn a_loaded_record_gives_the_same_bits() {
+    loaded(&strict_c(), |folder, compiler, input| {
+        run(&compiled(folder, "harness.c", &["-DSTRETCH_CAN_LOAD"], compiler), input)
+    });
+}
+
+#[test]
+#[ignore = "needs g++; ./ci.sh runs it"]
+fn with_gxx_a_loaded_record_gives_the_same_bits() {
+    loaded(&gcc_and_gxx(), |folder, compiler, input| {
+        run(&compiled(folder, "harness.c", &["-DSTRETCH_CAN_LOAD"], compiler), input)
+    });
+}
+
+#[test]
+#[ignore = "needs avr-gcc and simavr; ./ci.sh runs it"]
+fn with_avr_gcc_a_loaded_record_gives_the_same_bits() {
+    loaded(&uno(), |folder, compiler, input| {
+        on_uno(folder, "harness.c", &["-DSTRETCH_CAN_LOAD"], compiler, input)
+    });
+}
+
+fn loaded(compilers: &[Compiler], answers: impl Fn(&Path, &Compiler, &str) -> String) {
+    for (own, other, refused) in loads() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = Options { form: Some(Form::Fixed), adc: adc() };
+        fs::write(folder.path().join(HEADER), header(&own, &options).unwrap().text).unwrap();
+        let codes = &trial()[..200];
+        for compiler in compilers {
+            let what = format!("{} {:?}", compiler.program, compiler.arguments);
+            for (record, code) in &refused {
+                let found = answers(folder.path(), compiler, &loading(record));
+                assert_eq!(found, format!("load {code}\n"), "{what}: {record:?}");
+            }
+            let (bad, good) = (loading(&refused[3].0), loading(&record_of(&other, &adc())));
+            let samples = input(&own, Form::Fixed, codes);
+            let found =
+                answers(folder.path(), compiler, &[bad, samples.clone(), good, samples].concat());
+            let expected = [
+                "load 2\n",
+                &expected(&own, None, Form::Fixed, codes),
+                "load 0\n",
+                &expected(&other, None, Form::Fixed, codes),
+            ];
+            let answered = same(&what, &found, &expected.concat());
+            assert_eq!(answered, 2 * codes.len() + 2, "{what}");
+        }
+    }
+}
+
+/// Of records that are changed and have the right checksum, C loads those that Rust loads.
+#[test]
+fn a_changed_record_is_loaded_as_in_rust() {
+    for (own, other, _) in loads() {
+        let folder = tempfile::tempdir().unwrap();
+        let options = Options { form: Some(Form::Fixed), adc: adc() };
+        fs::write(folder.path().join(HEADER), header(&own, &options).unwrap().text).unwrap();
+        let [good, before] = [&other, &own].map(|c| record_of(c, &adc()));
+        let is_line = |bytes: &[u8]| {
+            let read = record::load::<FixedCalibration<11, 2>>(bytes);
+            read.ok()
+                .filter(|c| c.adc_bits() == 12 && c.sample_rate().hz() == 100.0)
+                .map(|c| matches!(c.numbers().surfaces, CodeMap::Line(_)))
+        };
+        let (mut input, mut expected) = (String::new(), String::new());
+        for (at, byte) in (0..good.len() - 4).flat_map(|at| (0..8).map(move |bit| (at, 1 << bit))) {
+            let mut changed = good.clone();
+            changed[at] ^= byte;
+            let changed = sealed(changed);
+            let loads = is_line(&changed) == is_line(&before);
+            writeln!(input, "{}{:x}\n{:x}", loading(&changed), 1700, 1800).unwrap();
+            writeln!(expected, "{}", if loads { "load 0" } else { "load" }).unwrap();
+        }
+        let [compiler] = strict_c();
+        let program = compiled(folder.path(), "harness.c", &["-DSTRETCH_CAN_LOAD"], &compiler);
+        let found = run(&program, &input);
+        let found: Vec<&str> = found.lines().filter(|line| line.starts_with("load")).collect();
+        let expected: Vec<&str> = expected.lines().collect();
+        assert_eq!(found.len(), expected.len());
+        for (n, (found, expected)) in found.into_iter().zip(expected).enumerate() {
+            let is_same = (found == "load 0") == (expected == "load 0");
+            assert!(is_same, "bit {} of byte {}: {found}", n % 8, n / 8);
+        }
+    }
 }
 
 /// An Uno has integers of 16 bits, a `double` of 32, 2 KB of RAM, and another library for floats.

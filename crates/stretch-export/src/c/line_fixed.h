@@ -6,18 +6,13 @@ typedef struct stretch_surface {
     int32_t slope;
 } stretch_surface;
 
-static const stretch_surface stretch_surfaces[1] STRETCH_FLASH = STRETCH_SURFACES;
-
-STRETCH_INLINE int32_t stretch_estimate(const stretch_state *s, uint32_t sample, int32_t rate,
+STRETCH_INLINE int32_t stretch_estimate(const stretch_surface *surface, uint32_t sample, int32_t rate,
                                        uint8_t *outside)
 {
-    stretch_surface room;
-    const stretch_surface *surface = STRETCH_LOADED(room, stretch_surfaces[0]);
     const int32_t signal =
         stretch_clamp(&surface->signal, ((int32_t)sample - surface->centre) * 32768,
                       STRETCH_SIGNAL_CLAMPED, outside);
     const uint64_t sum = stretch_sum((uint32_t)surface->intercept, 0x7fffffffu, surface->slope, signal);
-    (void)s;
     (void)rate;
     return (int32_t)(stretch_product(stretch_high(sum), surface->thousandths) >> 32);
 }

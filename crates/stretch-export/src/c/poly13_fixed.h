@@ -6,14 +6,10 @@ typedef struct stretch_surface {
     int32_t p[7];        /* p11 p12 p10 p00 p02 p03 p01, in the order of use */
 } stretch_surface;
 
-static const stretch_surface stretch_surfaces[2] STRETCH_FLASH = STRETCH_SURFACES;
-
 /* Horner's rule; the fraction of each product is carried into the next. */
-STRETCH_INLINE int32_t stretch_estimate(const stretch_state *s, uint32_t sample, int32_t rate,
+STRETCH_INLINE int32_t stretch_estimate(const stretch_surface *surface, uint32_t sample, int32_t rate,
                                        uint8_t *outside)
 {
-    stretch_surface room;
-    const stretch_surface *surface = STRETCH_LOADED(room, stretch_surfaces[s->branch]);
     const int32_t *p = surface->p;
     const int32_t signal =
         stretch_clamp(&surface->signal, ((int32_t)sample - surface->centre) * 32768,

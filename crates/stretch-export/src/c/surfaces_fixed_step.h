@@ -33,7 +33,7 @@ static inline stretch_reading stretch_step(stretch_state *s, int32_t code)
     if ((uint32_t)rate + band > 2u * band) {
         s->branch = (uint8_t)(((uint32_t)rate ^ STRETCH_MIRROR) >> 31);
     }
-    estimate = stretch_estimate(s, sample, rate, &outside);
+    estimate = stretch_at(s, sample, rate, &outside);
     return stretch_answer(STRETCH_OK, s->branch, outside, estimate);
 }
 

@@ -1,7 +1,9 @@
 //! C code for the models `linear` and `poly13`, in integers and in `float`, and for `curve` in
 //! `float`.
 
-use stretch_core::{Branch, Calibration, Poly13, RateEstimator, fixed::FixedPoly13};
+use stretch_core::{
+    Branch, Calibration, Poly13, RateEstimator, SampleRate, fixed::FixedPoly13, record::SCHEMA,
+};
 use stretch_filter::{SgFilter, SgShape};
 use stretch_receptor::{
     ReceptorError, StretchReceptor,
@@ -16,7 +18,7 @@ use crate::{
 };
 
 /// Returns the constants and the step (the C code for one sample) of a calibration in integers.
-pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
+pub(crate) fn surfaces_fixed(numbers: &FixedNumbers, rate_hz: SampleRate) -> Part {
     let FixedNumbers { adc_bits, falling, dead_band, surfaces, rate } = numbers;
     let adc_bits = u32::from((*adc_bits).min(16));
     let (factor, shift) = (rate.change_factor, rate.change_shift);
@@ -48,17 +50,26 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
             if *falling { u32::MAX } else { 0 },
             "all ones if a rising signal means a falling target",
         );
+    let [low, high] = halves(rate_hz.hz());
+    constants
+        .define("RATE_LOW", low, "bits of the sample rate as a double, in hertz")
+        .define("RATE_HIGH", high, "")
+        .define("SCHEMA", SCHEMA, "version of the binary calibration files that can be loaded");
     let (model, surface, has) = match surfaces {
         CodeMap::Line(ranged) => {
             let Scaled { of, thousandths } = ranged.surface;
             let (intercept, slope) = <(i32, i32)>::from(of);
             let signal = span(&ranged.signal);
             let line = [thousandths, intercept, slope].map(|n| n.c()).join(", ");
-            constants.surfaces(&[format!("{{{}, {signal}, {line}}}", ranged.centre)]);
+            constants
+                .define("SURFACE_COUNT", 1, "")
+                .surfaces(&[format!("{{{}, {signal}, {line}}}", ranged.centre)]);
             ("linear", include_str!("../c/line_fixed.h"), "static")
         }
         CodeMap::Poly13([inflation, deflation]) => {
-            constants.surfaces(&[poly13_fixed(inflation), poly13_fixed(deflation)]);
+            constants
+                .define("SURFACE_COUNT", 2, "one for each branch")
+                .surfaces(&[poly13_fixed(inflation), poly13_fixed(deflation)]);
             ("poly13", include_str!("../c/poly13_fixed.h"), "moving")
         }
     };
@@ -68,10 +79,16 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers) -> Part {
         step: vec![
             include_str!("../c/surfaces_fixed.h"),
             surface,
+            include_str!("../c/surfaces_fixed_load.h"),
             include_str!("../c/surfaces_fixed_step.h"),
         ],
         has: vec![has],
     }
+}
+
+/// Returns the lower and the upper 32 bits of a number.
+fn halves(x: f64) -> [u32; 2] {
+    [0, 32].map(|shift| (x.to_bits() >> shift) as u32)
 }
 
 fn span(span: &Span) -> String {

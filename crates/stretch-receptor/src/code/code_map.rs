@@ -31,9 +31,9 @@ impl Span {
     /// Whether both ends fit 32 bits after multiplication by the factor.
     #[cfg(feature = "serde")]
     fn holds(&self) -> bool {
-        let max = i64::from(self.min) + i64::from(self.width);
-        let fits = |end: i64| i32::try_from(end * i64::from(self.factor)).is_ok();
-        self.factor > 0 && fits(self.min.into()) && fits(max)
+        let fits = |end: i32| end.checked_mul(self.factor).is_some();
+        let max = self.min.checked_add_unsigned(self.width);
+        self.factor > 0 && fits(self.min) && max.is_some_and(fits)
     }
 
     /// Returns the nearest value inside the span, and 1 if the value was outside or 0 if it was inside.

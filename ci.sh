@@ -266,22 +266,11 @@ rm -rf "$linter"
 
 step "packages of all crates"
 crates=$(cd crates && echo *)
-# shellcheck disable=SC2046
-cargo package --quiet --locked --allow-dirty --no-verify --target-dir "$room/packages" $(packages $crates stretch-cli)
-if [ "$what" = deep ]; then
-    # each is unpacked and checked on its own, with the others in the place of the registry and the versions that are locked
-    for package in "$room"/packages/package/*.crate; do
-        tar -xzf "$package" -C "$room/packages"
-    done
-    {
-        printf '[workspace]\nresolver = "3"\nmembers = ["stretch-*"]\n[patch.crates-io]\n'
-        (cd "$room/packages" && for folder in stretch-*; do printf '%s = { path = "%s" }\n' "${folder%-*}" "$folder"; done)
-    } >"$room/packages/Cargo.toml"
-    cp Cargo.lock "$room/packages"
-    for package in $crates stretch-cli; do
-        (cd "$room/packages" && cargo check --quiet --offline -p "$package")
-    done
-fi
+verify=--no-verify
+# builds each from its package, with the others in the place of the registry, as cargo publish does
+[ "$what" != deep ] || verify=""
+# shellcheck disable=SC2046,SC2086
+plain CARGO_PROFILE_DEV_DEBUG=0 cargo package --quiet --locked --allow-dirty $verify --target-dir "$room/packages" $(packages $crates stretch-cli)
 
 step "public items since the last release"
 if ! cargo semver-checks --version >/dev/null 2>&1; then

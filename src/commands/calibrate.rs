@@ -10,9 +10,9 @@ use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::ValueEnum;
 use serde::Deserialize;
 use stretch_calibrate::{
-    CalibrateError, Calibrated, Candidate, MODELS_IN_WORDS, Memory, ModelChoice, ModelKind,
-    Options, Robust, SpellingError, calibrate, choose_model_watched, copied_signals, evaluate,
-    evaluate_errors, explains_little, explains_nothing, parse_rate, rank_signals,
+    CalibrateError, Calibrated, Candidate, Evaluation, MODELS_IN_WORDS, Memory, ModelChoice,
+    ModelKind, Options, Robust, SpellingError, calibrate, choose_model_watched, copied_signals,
+    evaluate, evaluate_errors, explains_little, explains_nothing, parse_rate, rank_signals,
     without_gross_errors,
 };
 use stretch_core::RateEstimator;
@@ -409,7 +409,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     let causes = match is_table {
         true => Causes::default(),
-        false => args.causes(&trials, &options)?.without_missing_pressure(&trials, &options),
+        false => args.causes(&trials, &options)?.without_missing_pressure(&trials),
     };
     options.causes.clone_from(&causes.found);
     let choice = match args.model() {
@@ -438,15 +438,24 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     outputs.file(&args.out, |out| out.write_all(&record))?;
     let test = read_trials(&args.test, Split::Test, &columns)?;
-    let judged = verdict(&calibrated, &trials, &test, &options);
-    if let Some(path) = &args.report {
-        // The line is the baseline with which every surface is compared.
-        let linear = Options { model: ModelKind::Linear, ..options.clone() };
-        let linear = calibrate(&trials, &linear).map_err(named)?;
-        let fitted = [&linear, &calibrated];
-        let page = report(&trials, &test, fitted, (&ranking, choice.as_ref()), &options)?;
-        stage_text(&mut outputs, path, &page)?;
-    }
+    let evaluation = match &args.report {
+        None => {
+            let (name, judged) =
+                (options.model.to_string(), if test.is_empty() { &trials } else { &test });
+            evaluate_errors(&[(&name, &calibrated.calibration)], judged)
+        }
+        Some(path) => {
+            // The line is the baseline with which every surface is compared.
+            let linear = Options { model: ModelKind::Linear, ..options.clone() };
+            let linear = calibrate(&trials, &linear).map_err(named)?;
+            let fitted = [&linear, &calibrated];
+            let (page, evaluation) =
+                report(&trials, &test, fitted, (&ranking, choice.as_ref()), &options)?;
+            stage_text(&mut outputs, path, &page)?;
+            Ok(evaluation)
+        }
+    };
+    let judged = verdict(&calibrated, &trials, evaluation, &options);
     let answer = serde_json::json!({
         "signal": options.signal,
         "candidates": ranking,
@@ -515,12 +524,15 @@ fn choose(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateE
     choice
 }
 
-/// Returns the sentence with the error of a calibration on the test trials, or on the fitted trials if
-/// there are no test trials.
-fn verdict(calibrated: &Calibrated, trials: &[Trial], test: &[Trial], options: &Options) -> String {
+/// Returns the sentence with the error of a calibration.
+fn verdict(
+    calibrated: &Calibrated,
+    trials: &[Trial],
+    evaluation: Result<Evaluation, CalibrateError>,
+    options: &Options,
+) -> String {
     let name = options.model.to_string();
-    let judged = if test.is_empty() { trials } else { test };
-    let evaluation = match evaluate_errors(&[(&name, &calibrated.calibration)], judged) {
+    let evaluation = match evaluation {
         Ok(evaluation) => evaluation,
         Err(error) => return format!("{name} was fitted but not judged, because {error}."),
     };
@@ -550,13 +562,14 @@ pub(super) fn other_columns(trials: &[Trial], but: &[String]) -> anyhow::Result<
     Ok(names)
 }
 
+/// Returns the report, and the errors of the raw signal and of the calibration.
 fn report(
     trials: &[Trial],
     test: &[Trial],
     [linear, calibrated]: [&Calibrated; 2],
     (ranking, choice): (&[Candidate], Option<&ModelChoice>),
     options: &Options,
-) -> anyhow::Result<String> {
+) -> anyhow::Result<(String, Evaluation)> {
     let judged = if test.is_empty() { trials } else { test };
     let name = options.model.to_string();
     let mut shown = vec![("linear", linear)];
@@ -564,7 +577,7 @@ fn report(
         shown.push((name.as_str(), calibrated));
     }
     let named: Vec<_> = shown.iter().map(|(name, c)| (*name, &c.calibration)).collect();
-    let evaluation = evaluate(&named, judged)?;
+    let mut evaluation = evaluate(&named, judged)?;
     let names = |trials: &[Trial]| trials.iter().map(|trial| trial.name.clone()).collect();
     let context = Context {
         title: format!("Calibration of {} on {}", options.reference, options.signal),
@@ -579,7 +592,10 @@ fn report(
         kinds: Vec::new(),
     };
     let judged = Judged { calibrated: &shown, evaluation: &evaluation, context: &context };
-    Ok(calibration_page(&judged))
+    let page = calibration_page(&judged);
+    let own = evaluation.pooled.len() - 1;
+    evaluation.pooled.drain(1..own);
+    Ok((page, evaluation))
 }
 
 #[cfg(test)]

@@ -5,10 +5,7 @@ use stretch_filter::FilterError;
 use stretch_fit::FitError;
 use stretch_receptor::ReceptorError;
 
-use crate::{
-    FIXED_STEP,
-    record::{GIVE_ADC, short},
-};
+use crate::{FIXED_STEP, PRESSURE, record::GIVE_ADC};
 
 /// Error of a fit to trials, or of the use of a calibration.
 #[derive(Debug, thiserror::Error)]
@@ -104,15 +101,13 @@ pub enum CalibrateError {
     },
     /// A cause needs a pressure, and a trial has none.
     #[error(
-        "{effect} needs the pressure, and {trial} has no column {column}; record it, or leave the effect out"
+        "{effect} needs the pressure, and {trial} has no column {PRESSURE}; record it, or leave the effect out"
     )]
     NoPressure {
         /// The cause.
         effect: String,
         /// The trial.
         trial: String,
-        /// The missing column.
-        column: String,
     },
     /// The signal is an angle that wraps. A calibration reads it sample by sample and therefore cannot count its turns.
     #[error(
@@ -180,8 +175,8 @@ pub enum CalibrateError {
     #[error(
         "the signal {signal} of the trials is between {} and {}, but the converter measures from {zero_v} to {full_scale_v}: this is not \
          the board's converter; {GIVE_ADC}",
-        short(*.min),
-        short(*.max)
+        four_digits(*.min),
+        four_digits(*.max)
     )]
     OutsideConverter {
         /// Column of the signal.
@@ -233,6 +228,15 @@ pub(crate) const PACE_TOLERANCE: f64 = 0.2;
 /// Returns the advice to fit a line, except for the models of `stretch-sleeve`, which replace `--model`.
 fn or_linear(model: &str) -> &'static str {
     if matches!(model, "array" | "prior") { "" } else { ", or fit --model linear" }
+}
+
+/// Formats four significant digits without trailing zeros.
+pub(crate) fn four_digits(x: f64) -> String {
+    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
+    if rounded != 0.0 && !(1e-4..1e7).contains(&rounded.abs()) {
+        return format!("{rounded:e}");
+    }
+    rounded.to_string()
 }
 
 /// Explains why no sample of a trial has an estimate. If samples come more slowly than a calibration expects, samples

@@ -19,7 +19,8 @@ pub use judge::{
     m3_instructions_fixed, on_own_ranges, pressure_column, rank_signals,
 };
 pub use options::{
-    Cause, MODELS_IN_WORDS, Memory, ModelKind, Options, Robust, SpellingError, SplitBy, parse_rate,
+    Cause, MODELS_IN_WORDS, Memory, ModelKind, Options, PRESSURE, Robust, SpellingError, SplitBy,
+    parse_rate,
 };
 pub use prepare::{MOST_ROWS, Rated, RatedPart, rated, without_gross_errors};
 pub use record::{

@@ -64,6 +64,9 @@ impl fmt::Display for Memory {
     }
 }
 
+/// Column of the pressure, which some causes need.
+pub const PRESSURE: &str = "pressure_kpa";
+
 /// Robust weighting of the residuals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Robust {
@@ -233,8 +236,6 @@ pub struct Options {
     pub date: String,
     /// The effects that a diagnosis named, for [`Memory::Diagnosed`].
     pub causes: Vec<Cause>,
-    /// Column of the pressure, which some causes need.
-    pub pressure: String,
 }
 
 impl Default for Options {
@@ -254,7 +255,6 @@ impl Default for Options {
             is_table: false,
             date: String::new(),
             causes: Vec::new(),
-            pressure: "pressure_kpa".into(),
         }
     }
 }

@@ -56,6 +56,20 @@ impl Target {
         }
     }
 
+    /// Returns the change of the reference per change of the target that is normalised by `range`: its span times
+    /// [`reference_per_target`](Self::reference_per_target).
+    ///
+    /// ```
+    /// use stretch_core::{Normalisation, Range, RangeSpec, Target};
+    /// let range = Range::new(RangeSpec { mode: Normalisation::MinMax, zero: 0.0, min: 0.0, max: 0.25 })?;
+    /// assert_eq!(Target::Contraction { rest_length: 80.0 }.reference_per_normalised(range), -20.0);
+    /// # Ok::<(), stretch_core::DesignError>(())
+    /// ```
+    #[inline]
+    pub fn reference_per_normalised(self, range: Range) -> f64 {
+        self.reference_per_target() * range.span()
+    }
+
     /// Returns the name of a branch: `inflation` or `deflation` for a contraction, `rising` or `falling` otherwise.
     ///
     /// ```
@@ -238,7 +252,7 @@ fn check_sizes(spec: &CalibrationSpec) -> Result<(), DesignError> {
     let fits = band == 0.0 || (LEAST * LEAST..=MOST * RATES_HZ.end()).contains(&band);
     DesignError::check("dead_band", band, fits)?;
     let scales = Scales {
-        gain: spec.target.reference_per_target() * spec.target_range.span(),
+        gain: spec.target.reference_per_normalised(spec.target_range),
         zero: spec.target.to_reference(spec.target_range.offset()),
         signal: spec.signal_range,
     };

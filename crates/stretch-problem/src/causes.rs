@@ -1,6 +1,6 @@
 //! The effects of a diagnosis that a calibration can use.
 
-use stretch_calibrate::{Cause, Options};
+use stretch_calibrate::{Cause, Options, PRESSURE};
 use stretch_data::{SessionTrial, Trial};
 use stretch_effects::{Effect as Known, EffectParameter, Need, gauge_effect};
 use stretch_gap::{Candidate, Diagnosis, Options as Diagnosing, VerdictKind, diagnose};
@@ -55,16 +55,16 @@ impl Causes {
 
     /// Leaves out effects that need a pressure, with a note for each, if some trial has no
     /// pressure.
-    pub fn without_missing_pressure(mut self, trials: &[Trial], options: &Options) -> Self {
-        let has_pressure = trials.iter().all(|t| t.channel(&options.pressure).is_some());
+    pub fn without_missing_pressure(mut self, trials: &[Trial]) -> Self {
+        let has_pressure = trials.iter().all(|t| t.channel(PRESSURE).is_some());
         let needs = |cause: &Cause| {
             let effect = gauge_effect(&cause.effect);
             !has_pressure && effect.is_some_and(|e| e.needs == Some(Need::Pressure))
         };
         let left_out: Vec<Cause> = self.found.extract_if(.., |cause| needs(cause)).collect();
         self.notes.extend(left_out.iter().map(|cause| {
-            let (effect, column) = (&cause.effect, &options.pressure);
-            format!("{effect} is left out, because it needs the pressure and some trial has no column {column}")
+            let effect = &cause.effect;
+            format!("{effect} is left out, because it needs the pressure and some trial has no column {PRESSURE}")
         }));
         self
     }

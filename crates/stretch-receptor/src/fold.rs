@@ -9,7 +9,7 @@ use crate::ReceptorError;
 pub(crate) fn output(calibration: &Calibration) -> (f64, f64) {
     let range: Range = calibration.spec().target_range;
     let target = calibration.spec().target;
-    (target.reference_per_target() * range.span(), target.to_reference(range.offset()))
+    (target.reference_per_normalised(range), target.to_reference(range.offset()))
 }
 
 /// Returns the dead band as a rate of the reference, converted by the ratio of the two ranges.

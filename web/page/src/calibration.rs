@@ -67,8 +67,8 @@ pub(crate) struct Built {
 
 pub(crate) fn causes(files: &Files, choices: &Choices) -> Result<Built, Said> {
     let (options, (trials, _)) = (choices.options()?, choices.trials(files)?);
-    let Causes { found, notes } = Causes::of(&trials, &options, &progress, &|| false)
-        .without_missing_pressure(&trials, &options);
+    let Causes { found, notes } =
+        Causes::of(&trials, &options, &progress, &|| false).without_missing_pressure(&trials);
     Ok(Built { causes: found, cause_notes: notes })
 }
 

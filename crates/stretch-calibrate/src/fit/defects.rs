@@ -92,8 +92,8 @@ impl Defects {
             |effect: &&(&Effect, Live)| effect.0.needs == Some(Need::Pressure) && pressure == 0.0;
         if let Some((effect, _)) = all.named.iter().find(needs) {
             let effect = effect.name.to_owned();
-            let (trial, column) = (prepared.first_trial.clone(), prepared.options.pressure.clone());
-            return Err(CalibrateError::NoPressure { effect, trial, column });
+            let trial = prepared.first_trial.clone();
+            return Err(CalibrateError::NoPressure { effect, trial });
         }
         Ok(all)
     }

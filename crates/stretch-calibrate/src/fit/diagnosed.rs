@@ -379,7 +379,7 @@ impl<'a> Record<'a> {
     ) -> Result<DiagnosedMap, CalibrateError> {
         let prepared = self.prepared;
         let map = DiagnosedMap { agility, steady_s, ..self.map(forward)? };
-        let unit = (prepared.target.reference_per_target() * prepared.target_range.span()).abs();
+        let unit = prepared.target.reference_per_normalised(prepared.target_range).abs();
         let mut apart = 0.0;
         let tally = judge_live(prepared, Model::Diagnosed(map), |error, reading| {
             apart += reading.sd.map_or(0.0, |sd| (error * unit / sd.max(1e-12)).powi(2));

@@ -3,9 +3,9 @@
 use stretch_core::{Calibration, Label};
 use stretch_data::Trial;
 
-use crate::{fit::FitReport, prepare::without_gross_errors};
+use crate::{error::four_digits, fit::FitReport, prepare::without_gross_errors};
 
-use super::{evaluate::MethodErrors, reach::four_digits};
+use super::evaluate::MethodErrors;
 
 /// A fit whose error is more than this share of the reference's standard deviation explains nothing, because the mean
 /// of the reference alone has an error that is at most about a twentieth larger. (The same margin of a twentieth
@@ -99,7 +99,7 @@ pub(super) fn off_throughout(
     let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
     let unshifted = (rmse * rmse - bias * bias).max(0.0).sqrt();
     let spec = calibration.spec();
-    let reference_per_rmse = spec.target_range.span() * spec.target.reference_per_target().abs();
+    let reference_per_rmse = spec.target.reference_per_normalised(spec.target_range).abs();
     let alike = ALIKE * spec.model.fit_rmse() * reference_per_rmse;
     let is_shift = unshifted <= bias.abs() || (unshifted <= alike && alike < rmse);
     (is_far && is_shift).then(|| {

@@ -9,7 +9,7 @@ use stretch_filter::{Arrival, Cadence, NamedRate, RateFilter};
 use stretch_receptor::{MAX_BRIDGED, Reading, Receptor, Withheld};
 
 use crate::{
-    CalibrateError,
+    CalibrateError, PRESSURE,
     prepare::{extent, rates_at_use, sample_rate_hz},
 };
 
@@ -206,7 +206,7 @@ pub fn at_rate(calibration: &Calibration, rate_hz: f64) -> Result<Calibration, C
 /// Returns the column of the pressure, if a calibration needs one in addition to its signal.
 pub fn pressure_column(calibration: &Calibration) -> Option<&'static str> {
     match &calibration.spec().model {
-        Model::Diagnosed(map) if map.crosstalk.is_some() => Some("pressure_kpa"),
+        Model::Diagnosed(map) if map.crosstalk.is_some() => Some(PRESSURE),
         _ => None,
     }
 }

@@ -1,6 +1,8 @@
 //! Explanations of the choice of a model.
 
-use super::{model_choice::Found, reach::four_digits};
+use crate::error::four_digits;
+
+use super::model_choice::Found;
 
 /// Figures that determine a choice.
 #[derive(Debug)]

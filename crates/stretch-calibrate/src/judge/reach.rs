@@ -3,7 +3,7 @@
 use stretch_core::{Calibration, Interval, Range};
 use stretch_data::unit_of;
 
-use crate::prepare::extent;
+use crate::{error::four_digits, prepare::extent};
 
 use super::{acceptance::IS_IT_THE_SENSOR, doubt::Doubt};
 
@@ -152,15 +152,6 @@ fn thousands(count: u64) -> String {
         grouped.push(digit);
     }
     grouped
-}
-
-/// Formats four significant digits without trailing zeros.
-pub(crate) fn four_digits(x: f64) -> String {
-    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
-    if rounded != 0.0 && !(1e-4..1e7).contains(&rounded.abs()) {
-        return format!("{rounded:e}");
-    }
-    rounded.to_string()
 }
 
 #[cfg(test)]

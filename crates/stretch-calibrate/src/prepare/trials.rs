@@ -7,7 +7,7 @@ use stretch_core::{
 use stretch_data::{Even, EvenSpec, Rows, Trial, check_rows};
 use stretch_filter::RateFilter;
 
-use crate::{CalibrateError, ModelKind, Options};
+use crate::{CalibrateError, ModelKind, Options, PRESSURE};
 
 use super::{
     doubts::{Line, doubts},
@@ -192,8 +192,8 @@ impl Evened {
         let mut columns = vec![options.signal.as_str(), options.reference.as_str()];
         // The column is added only if the pressure was recorded. If it is missing, a later error names the cause that
         // needs it.
-        let has_pressure = options.needs_pressure() && trial.channel(&options.pressure).is_some();
-        columns.extend(has_pressure.then_some(options.pressure.as_str()));
+        let has_pressure = options.needs_pressure() && trial.channel(PRESSURE).is_some();
+        columns.extend(has_pressure.then_some(PRESSURE));
         let even = even(trial, &columns, 1, sample_rate)?;
         self.turn = self.turn.or(even.turns[1]);
         self.rows.add(even.rows);

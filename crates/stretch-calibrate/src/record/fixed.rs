@@ -14,7 +14,7 @@ use stretch_receptor::{
     },
 };
 
-use crate::{CalibrateError, SpellingError};
+use crate::{CalibrateError, SpellingError, error::four_digits};
 
 /// Buffer size for the largest file, an observer in which every number has its greatest length.
 const BYTES: usize = 1024;
@@ -140,8 +140,8 @@ pub fn converter_reach(
     Ok(Some(format!(
         "the calibrated range of {signal} is from {} to {}, and the converter measures from {zero_v} to {full_scale_v}, {what}; if this is \
          not the board's converter, {GIVE_ADC}",
-        short(min),
-        short(max)
+        four_digits(min),
+        four_digits(max)
     )))
 }
 
@@ -151,11 +151,6 @@ const FEW_CODES: f64 = 16.0;
 /// What to do about a converter that does not fit the signal.
 pub(crate) const GIVE_ADC: &str = "give it with --adc BITS,ZERO,FULL_SCALE in the unit of the signal column, \
                                    such as 12,0,3.3 for volts or 10,0,1023 for counts of 10 bits";
-
-/// Rounds a number to six digits, for a message.
-pub(crate) fn short(x: f64) -> f64 {
-    format!("{x:.5e}").parse().unwrap_or(x)
-}
 
 fn too_coarse(calibration: &Calibration) -> CalibrateError {
     let reference = calibration.spec().reference.clone();

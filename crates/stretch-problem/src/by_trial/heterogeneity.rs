@@ -55,7 +55,8 @@ impl Heterogeneity {
     }
 }
 
-/// A run that differs from the others, which agree with one another.
+/// A run that differs from the others, which agree with one another in at least one of these values. Its set-up is
+/// probably different.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Apart {
     /// Name of the run.
@@ -64,9 +65,6 @@ pub struct Apart {
     pub values: Vec<String>,
     /// For each value, its distance from the mean of the other runs, in standard deviations.
     pub deviations: Vec<f64>,
-    /// Whether the other runs agree with one another in at least one of these values. The run then
-    /// has another set-up.
-    pub is_set_up: bool,
 }
 
 impl Apart {
@@ -74,11 +72,11 @@ impl Apart {
     pub fn sentence(&self) -> String {
         let each = self.values.iter().zip(&self.deviations);
         let each: Vec<String> = each.map(|(name, z)| format!("{name} ({z:+.1} sd)")).collect();
-        let other = match self.is_set_up {
-            true => "; the other runs agree without it, so its set-up is probably different",
-            false => "",
-        };
-        format!("{} differs from the others in {}{other}", self.run, each.join(", "))
+        format!(
+            "{} differs from the others in {}; the other runs agree without it, so its set-up is probably different",
+            self.run,
+            each.join(", ")
+        )
     }
 }
 
@@ -167,12 +165,10 @@ pub(super) fn apart(runs: &[Run]) -> Vec<Apart> {
     let of_run = |run: usize| {
         let own: Vec<_> = found.iter().filter(|(r, ..)| *r == run).collect();
         // One run cannot be judged by others that disagree among themselves.
-        let is_set_up = own.iter().any(|(.., agree)| *agree);
-        (is_set_up).then(|| Apart {
+        own.iter().any(|(.., agree)| *agree).then(|| Apart {
             run: runs[run].0.clone(),
             values: own.iter().map(|(_, v, ..)| fitted(runs)[*v].identified.name.clone()).collect(),
             deviations: own.iter().map(|(_, _, z, _)| *z).collect(),
-            is_set_up,
         })
     };
     (0..runs.len()).filter_map(of_run).collect()

@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use stretch_calibrate::PRESSURE;
 use stretch_data::{EvenSession, Rows, SessionTrial, ends, unit};
 use stretch_gap::{Noise, TrialSpec};
 
@@ -18,8 +19,6 @@ use crate::{
 const LEAST: usize = 300;
 /// Parts of a trial with fewer samples are left out.
 const SHORTEST: usize = 100;
-/// Column of the pressure.
-const PRESSURE: &str = "pressure_kpa";
 
 /// The measured session of a gauge alone; columns hold all trials end to end.
 #[derive(Debug)]

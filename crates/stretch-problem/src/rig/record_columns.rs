@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 
+use stretch_calibrate::PRESSURE;
 use stretch_gap::{Column, Description, Distortion};
 use stretch_sim::{Key, RigStage};
 
@@ -11,7 +12,6 @@ use super::{
 };
 use crate::bench::specs::skew_of;
 
-pub(super) const PRESSURE: &str = "pressure_kpa";
 pub(super) const LENGTH: &str = "length_mm";
 const VOLTAGE: &str = "bridge_v";
 pub(super) const COMMANDS: &str = "inlet, outlet";

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use stretch_calibrate::PRESSURE;
 use stretch_data::{DataSet, EvenSession, EvenTrial, Rows, SessionTrial, Split, ends};
 use stretch_gap::{copied, noise_variance};
 use stretch_recording::{ReadOptions, Recording};
@@ -20,7 +21,6 @@ use crate::{
 
 /// Columns that a rig needs; the pressure is optional.
 const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
-const PRESSURE: &str = "pressure_kpa";
 /// Simulated outputs: pressure, length and voltage.
 const OUTPUTS: usize = 3;
 /// Column of the bridge's excitation, a share of the nominal one, the same throughout a trial; 1 if

@@ -110,7 +110,7 @@ impl Linear {
 
     /// Returns `zero` and `gain` of `reference = zero + gain * normalised target`.
     pub(crate) fn zero_and_gain(&self) -> (f64, f64) {
-        let gain = self.target_range.span() * self.target.reference_per_target();
+        let gain = self.target.reference_per_normalised(self.target_range);
         (self.target.to_reference(self.target_range.offset()), gain)
     }
 

@@ -84,7 +84,7 @@ pub fn calibrate_array(trials: &[Trial], options: &ArrayOptions) -> Result<Array
     let triangle = &parted.whole.triangle;
     let terms = parted.terms;
     let gram = (triangle.tr_mul(triangle) / count).view((0, 0), (terms, terms)).into_owned();
-    let unit = target_range.span() * target.reference_per_target().abs();
+    let unit = target.reference_per_normalised(target_range).abs();
     let carried = carried(&parted, &options.signals, held.rmse, unit);
     let linear = Linear {
         signals: options.signals.clone(),

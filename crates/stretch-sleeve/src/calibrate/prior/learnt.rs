@@ -79,7 +79,7 @@ pub struct Prior {
 impl Prior {
     /// Returns the size of one unit of the normalised target in the reference's unit, without its sign.
     pub(super) fn unit_of_target(&self) -> f64 {
-        self.target_range.span() * self.target.reference_per_target().abs()
+        self.target.reference_per_normalised(self.target_range).abs()
     }
 
     /// Returns the longest observed runs of equal samples.
@@ -131,7 +131,7 @@ impl Prior {
         let gram = leaves
             .iter()
             .fold(DMatrix::zeros(bank.terms(), bank.terms()), |sum, leaf| sum + &leaf.gram / count);
-        let unit = target_range.span() * target.reference_per_target().abs();
+        let unit = target.reference_per_normalised(target_range).abs();
         Ok(Self {
             schema: SCHEMA,
             signals: first.signals.clone(),

@@ -9,8 +9,8 @@ use stretch_calibrate::Doubt;
 use stretch_data::{Trial, push_number, unit};
 use stretch_recording::ReadOptions;
 use stretch_sleeve::{
-    AppliedArray, ArrayCalibration, ArrayChannel, ArrayLoss, ArrayReading, MAX_CHANNELS,
-    apply_array,
+    AppliedArray, ArrayCalibration, ArrayChannel, ArrayLoss, ArrayReading, ArrayWithheld,
+    MAX_CHANNELS, apply_array,
 };
 
 use super::{apply::write_out, reading::read_recording};
@@ -30,21 +30,7 @@ pub(super) fn apply_several(
     let trial = read_recording(trial, &options)?;
     let applied = apply_array(calibration, &trial)?;
     write_out(out, |out| write_all(calibration, &trial, &applied, out))?;
-    for (channel, time_s, loss) in &applied.losses {
-        let ArrayChannel { signal, possible, .. } = &calibration.spec().channels[*channel];
-        let at = trial.time_s.iter().position(|time| time == time_s);
-        let sample = at.and_then(|at| trial.channel(signal.as_str())?.get(at).copied());
-        let beyond = |sample: f64| (sample - possible.max).max(possible.min - sample);
-        let by = match sample.filter(|_| *loss == ArrayLoss::Outside) {
-            Some(sample) => format!(", by {}", number(beyond(sample))),
-            None => String::new(),
-        };
-        warn(format!(
-            "stretch: {}: {signal} is left out from {time_s:.2} s on: {loss}{by}",
-            trial.name
-        ));
-    }
-    tell_shifts(calibration, &trial.name, &applied);
+    warnings(calibration, &trial, &applied).for_each(|text| warn(format!("stretch: {text}")));
     report(&applied);
     Ok(())
 }
@@ -65,28 +51,70 @@ fn report(applied: &AppliedArray) {
     doubt.iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
 }
 
-/// Prints a line each time a gauge begins to deviate from the other gauges.
-fn tell_shifts(calibration: &ArrayCalibration<MAX_CHANNELS>, trial: &str, applied: &AppliedArray) {
-    let Some(usual) = &calibration.spec().shifts else { return };
+/// Returns a sentence for each gauge that is left out somewhere, and for each time at which a gauge begins to deviate
+/// from the other gauges.
+pub(super) fn warnings<'a>(
+    calibration: &'a ArrayCalibration<MAX_CHANNELS>,
+    trial: &'a Trial,
+    applied: &'a AppliedArray,
+) -> impl Iterator<Item = String> + 'a {
+    let losses = applied.losses.iter().map(move |(channel, time_s, loss)| {
+        let ArrayChannel { signal, possible, .. } = &calibration.spec().channels[*channel];
+        let lost = applied.readings.iter().filter(|r| match r {
+            Ok(reading) => reading.is_lost(*channel),
+            Err(withheld) => *withheld == ArrayWithheld::AllLost,
+        });
+        let at = trial.time_s.iter().position(|time| time == time_s);
+        let sample = at.and_then(|at| trial.channel(signal.as_str())?.get(at).copied());
+        let beyond = |sample: f64| (sample - possible.max).max(possible.min - sample);
+        let by = match sample.filter(|_| *loss == ArrayLoss::Outside) {
+            Some(sample) => format!(", by {}", number(beyond(sample))),
+            None => String::new(),
+        };
+        format!(
+            "{}: {signal} is left out of {} of {} samples, the first at {time_s:.2} s: {loss}{by}",
+            trial.name,
+            lost.count(),
+            trial.len()
+        )
+    });
+    losses.chain(shifts(calibration, &trial.name, applied))
+}
+
+/// Returns a sentence for each time at which a gauge begins to deviate from the other gauges.
+fn shifts<'a>(
+    calibration: &'a ArrayCalibration<MAX_CHANNELS>,
+    trial: &'a str,
+    applied: &'a AppliedArray,
+) -> impl Iterator<Item = String> + 'a {
     let unit = unit(calibration.spec().reference.as_str()).unwrap_or_default();
-    let mut before = 0;
-    for (time_s, shifts) in &applied.shifts {
-        if shifts.shifted != 0 && before == 0 {
-            let first = shifts.shifted.trailing_zeros() as usize;
-            let k = shifts.most.unwrap_or(first);
-            let name = calibration.spec().channels[k].signal.as_str();
-            let others = match calibration.spec().channels.len() {
-                2 => "the other gauge (the data cannot tell which of the two has moved)",
-                _ => "the other gauges",
-            };
-            warn(format!(
-                "stretch: {trial}: at {time_s:.2} s the estimate from {name} differs by at least {} {unit} from {others}; in the calibration it differed by up to {} {unit}. If the gauge was put on again, calibrate again",
-                number(shifts.off[k].abs()),
-                number(usual.limits[k]),
-            ));
-        }
-        before = shifts.shifted;
-    }
+    // Consecutive blocks with a shift are one report, which names the gauges that all of these blocks name.
+    let runs = applied.shifts.chunk_by(|(_, a), (_, b)| (a.shifted != 0) == (b.shifted != 0));
+    runs.filter(|run| run[0].1.shifted != 0).filter_map(move |run| {
+        let (time_s, shifts) = &run[0];
+        let suspects = run.iter().fold(shifts.shifted, |all, (_, shifts)| {
+            if all & shifts.shifted == 0 { all } else { all & shifts.shifted }
+        });
+        let limits = &calibration.spec().shifts.as_ref()?.limits;
+        let channels = calibration.spec().channels.iter().enumerate();
+        let (at, names): (Vec<usize>, Vec<&str>) = channels
+            .filter(|(k, _)| suspects & (1 << k) != 0)
+            .map(|(k, channel)| (k, channel.signal.as_str()))
+            .unzip();
+        let beyond = |k: &usize| shifts.off[*k].abs() / limits[*k];
+        let k = at.into_iter().max_by(|a, b| beyond(a).total_cmp(&beyond(b)))?;
+        let name = calibration.spec().channels[k].signal.as_str();
+        let off = number(shifts.off[k].abs());
+        let which = match &names[..] {
+            [_] => format!("{name} has shifted"),
+            several => format!("{} has shifted (the data cannot tell which)", several.join(" or ")),
+        };
+        Some(format!(
+            "{trial}: at {time_s:.2} s, {which}: the estimate from {name} alone differs by at least {off} {unit} from that of the other gauges; in the \
+             calibration it differed by up to {} {unit}. If the gauge was put on again, calibrate again",
+            number(limits[k])
+        ))
+    })
 }
 
 fn write_all(

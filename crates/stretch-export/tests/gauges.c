@@ -53,7 +53,7 @@ int main(void)
         }
 #ifdef STRETCH_SHIFT_SAMPLES
         if (stretch_shifts_step(&blocks, &state, &told)) {
-            printf(" shifts %u %d", (unsigned)told.shifted, (int)told.most);
+            printf(" shifts %u", (unsigned)told.shifted);
             for (k = 0; k < STRETCH_CHANNELS; k++) {
                 printf(" %08lx", bits_of(told.off[k]));
             }

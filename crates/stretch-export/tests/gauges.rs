@@ -199,9 +199,8 @@ fn told<const N: usize>(calibration: &ArrayCalibration<N>, rows: &[Row]) -> (Str
             write!(expected, " {loss}").unwrap();
         }
         let shifts = watched.as_mut().and_then(|(watch, own)| watch.step(own, &receptor, &memory));
-        if let Some(Shifts { off, shifted, most }) = shifts {
-            let most = most.map_or(-1, |most| most as i32);
-            write!(expected, " shifts {shifted} {most}").unwrap();
+        if let Some(Shifts { off, shifted }) = shifts {
+            write!(expected, " shifts {shifted}").unwrap();
             for off in &off[..calibration.spec().channels.len()] {
                 write!(expected, " {:08x}", off.to_bits()).unwrap();
             }

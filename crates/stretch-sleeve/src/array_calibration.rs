@@ -25,7 +25,8 @@ pub struct ArrayChannel<const N: usize> {
     pub state_min: Values<ARRAY_STATES>,
     /// Upper end of the range of each state in the fitted data, in the signal's unit.
     pub state_max: Values<ARRAY_STATES>,
-    /// Range of possible samples. A sample outside means that the channel is cut off or at the end of its converter.
+    /// Range of possible samples. Several samples outside in a row mean that the channel is cut off or at the end of its
+    /// converter.
     pub possible: Interval,
     /// Number of repetitions of one value, counted while another channel changes, from which on the channel counts as
     /// stuck. 0: repetitions are usual and not checked.

@@ -144,9 +144,47 @@ fn what_is_lost_says_so_in_the_deviation_and_comes_back_when_asked() {
     assert_eq!((alone.sd, alone.lost), (5.0, 0b0110));
     (0..CHANNELS).for_each(|k| memory.readmit(k));
     assert_eq!(run(&mut memory, &[], 200).map(|r| (r.lost, r.sd)), Ok((0, 2.0)));
-    // All channels are cut off.
-    assert_eq!(receptor.step(&mut memory, [99.0; CHANNELS]), Err(ArrayWithheld::AllLost));
+    // All channels are cut off, and come back by themselves.
+    let cut_off = (0..4).map(|_| receptor.step(&mut memory, [99.0; CHANNELS])).last();
+    assert_eq!(cut_off, Some(Err(ArrayWithheld::AllLost)));
     assert_eq!(run(&mut memory, &[], 250), Err(ArrayWithheld::AllLost));
+    let back = (300..500).map(|n| step(&mut memory, &[], n)).last().unwrap();
+    assert_eq!(back.map(|r| (r.lost, r.sd)), Ok((0, 2.0)));
+}
+
+/// A fault ends after one sample or after a while. The estimate must be as good as before soon after the fault.
+#[test]
+fn a_channel_with_damaged_samples_comes_back() {
+    let receptor = ArrayReceptor::<f64, CHANNELS>::new(&calibration());
+    for (name, (fault, why)) in
+        FAULTS.into_iter().filter(|(_, (_, why))| *why != ArrayLoss::Slipped)
+    {
+        for (channel, damaged) in [(0, 1), (1, 3), (2, 50), (3, 700)] {
+            let mut memory = receptor.memory();
+            let began = samples(AT)[channel];
+            let mut lost = 0;
+            for n in 0..AT + damaged + 400 {
+                let mut now = samples(n);
+                if (AT..AT + damaged).contains(&n) {
+                    now[channel] = fault(now[channel], began);
+                }
+                let reading = receptor.step(&mut memory, now);
+                let Ok(reading) = reading else { panic!("{name}, {channel}: {reading:?} at {n}") };
+                lost = reading.lost;
+                let off = (reading.estimate - 90.0 * motion(n)).abs();
+                let is_found = (AT..AT + SOON).contains(&n);
+                assert!(
+                    off < if is_found { 10.0 } else { 1.0 },
+                    "{name}, {channel}: off by {off} at {n}"
+                );
+            }
+            assert_eq!(
+                (lost, memory.loss(channel)),
+                (0, None),
+                "{name} for {damaged} samples: {why:?}"
+            );
+        }
+    }
 }
 
 #[test]
@@ -159,13 +197,17 @@ fn a_recorder_that_is_silent_costs_no_channel() {
         now[3] = 99.0;
         now
     };
-    for n in 0..2000 {
+    (0..3).for_each(|n| {
+        assert_eq!(receptor.step(&mut memory, channels(n)), Err(ArrayWithheld::Warming));
+    });
+    for n in 3..2000 {
         let silent = n % 100 % 60 < 10 && n >= 100;
         let reading = receptor.step(&mut memory, if silent { [f64::NAN; 4] } else { channels(n) });
         if silent && n % 100 % 60 >= 3 {
             assert_eq!(reading, Err(ArrayWithheld::Missing), "at {n}");
         } else {
-            let reading = reading.unwrap();
+            // The last channel never has a possible sample, and is lost after three of them.
+            let Ok(reading) = reading else { panic!("{reading:?} at {n}") };
             assert_eq!(reading.lost, 0b1000, "at {n}");
             // Three samples are bridged while the motion continues.
             let off = (reading.estimate - 90.0 * motion(n)).abs();

@@ -4,3 +4,4 @@
 mod array;
 mod firmware;
 mod record;
+mod shifted;

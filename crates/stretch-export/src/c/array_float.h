@@ -5,9 +5,7 @@
 #define STRETCH_LOST_MISSING 1 /* its samples are missing */
 #define STRETCH_LOST_OUTSIDE 2 /* outside its range: disconnected, or the converter at its limit */
 #define STRETCH_LOST_STILL 3   /* it repeats one value while others change */
-@if several
 #define STRETCH_LOST_SLIPPED 4 /* it jumped away from the value that the others predict */
-@end
 
 typedef struct stretch_reading {
     float estimate; /* in STRETCH_UNIT */
@@ -31,6 +29,7 @@ typedef struct stretch_channel {
 @end
     float held;       /* the value that is repeated */
     uint16_t repeats; /* how often recently; 0 before the first sample */
+    uint32_t good;    /* while it is left out: samples in a row without a fault */
     uint8_t begun;
     uint8_t missing;
     uint8_t loss;
@@ -62,6 +61,7 @@ static STRETCH_APART void stretch_forget(stretch_channel *c)
 @end
     c->held = 0.0f;
     c->repeats = 0;
+    c->good = 0;
     c->begun = 0;
     c->missing = 0;
 }
@@ -141,12 +141,18 @@ STRETCH_INLINE uint16_t stretch_repeats(stretch_channel *c, float x, int others_
     return c->repeats;
 }
 
+STRETCH_INLINE int stretch_possible(int k, float x)
+{
+    return stretch_usable(x) && x >= STRETCH_FLOAT(stretch_least[k]) &&
+           x <= STRETCH_FLOAT(stretch_most[k]);
+}
+
 /* Takes a sample. Returns why the channel is lost, or STRETCH_IN_USE. */
 STRETCH_INLINE uint8_t stretch_take(stretch_channel *c, int k, float x, int others_change)
 {
-    if (!stretch_usable(x)) {
+    if (!stretch_possible(k, x)) {
         if (c->missing >= STRETCH_MAX_BRIDGED) {
-            return STRETCH_LOST_MISSING;
+            return stretch_usable(x) ? STRETCH_LOST_OUTSIDE : STRETCH_LOST_MISSING;
         }
         c->missing = (uint8_t)(c->missing + 1u);
         if (c->begun) {
@@ -155,14 +161,22 @@ STRETCH_INLINE uint8_t stretch_take(stretch_channel *c, int k, float x, int othe
         return STRETCH_IN_USE;
     }
     c->missing = 0;
-    if (x < STRETCH_FLOAT(stretch_least[k]) || x > STRETCH_FLOAT(stretch_most[k])) {
-        return STRETCH_LOST_OUTSIDE;
-    }
     if (stretch_repeats(c, x, others_change) >= STRETCH_INT(stretch_still[k])) {
         return STRETCH_LOST_STILL;
     }
     stretch_pass(c, x);
     return STRETCH_IN_USE;
+}
+
+/* Takes a sample of a channel that is left out. Returns whether enough samples in a row have had no fault. */
+static STRETCH_APART int stretch_recovered(stretch_channel *c, int k, float x, int others_change)
+{
+    if (!stretch_possible(k, x) || stretch_repeats(c, x, others_change) >= STRETCH_INT(stretch_still[k])) {
+        stretch_forget(c);
+        return 0;
+    }
+    c->good = c->good + 1u;
+    return c->good >= STRETCH_RECOVERY;
 }
 
 @if several
@@ -363,10 +377,17 @@ static STRETCH_APART stretch_reading stretch_step(stretch_state *s, const float 
     int change = 0, heard = 0, waiting = 0, k;
     for (k = 0; k < STRETCH_CHANNELS; k++) {
         const stretch_channel *c = &s->of[k];
-        if (c->loss == STRETCH_IN_USE) {
+        if (c->loss == STRETCH_IN_USE && stretch_usable(samples[k])) {
             change |= !c->begun || !(samples[k] >= c->last && samples[k] <= c->last);
-            heard |= stretch_usable(samples[k]);
         }
+    }
+    for (k = 0; k < STRETCH_CHANNELS; k++) {
+        stretch_channel *c = &s->of[k];
+        if (c->loss != STRETCH_IN_USE && c->loss != STRETCH_LOST_SLIPPED &&
+            stretch_recovered(c, k, samples[k], change)) {
+            stretch_readmit(s, k);
+        }
+        heard |= c->loss == STRETCH_IN_USE && stretch_usable(samples[k]);
     }
     if (!heard) {
         return stretch_lost(s);

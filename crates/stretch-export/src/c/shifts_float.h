@@ -13,8 +13,7 @@ typedef struct stretch_shifts_state {
 /* Result of a block of time for every gauge. */
 typedef struct stretch_shifts {
     float off[STRETCH_CHANNELS]; /* difference from the estimate of the others, in STRETCH_UNIT */
-    uint16_t shifted;            /* a bit for each gauge that is off by more than its limit */
-    int8_t most;                 /* the gauge that is farthest off relative to its limit; -1 if it is unknown */
+    uint16_t shifted;            /* a bit for each gauge that may have shifted; 0 if none has */
 } stretch_shifts;
 
 static inline void stretch_shifts_init(stretch_shifts_state *b)
@@ -44,12 +43,28 @@ STRETCH_INLINE float stretch_difference(const stretch_state *s, int k)
     return own - others;
 }
 
+/* The largest deviation, as a share of its limit, that a shift of gauge k does not explain. */
+static STRETCH_APART float stretch_shift_left(const float *shares, int k)
+{
+    float size = 0.0f, left = 0.0f;
+    int j;
+    for (j = 0; j < STRETCH_CHANNELS; j++) {
+        size = size + STRETCH_FLOAT(stretch_shift_along[k][j]) * shares[j];
+    }
+    for (j = 0; j < STRETCH_CHANNELS; j++) {
+        float rest = shares[j] - size * STRETCH_FLOAT(stretch_shift_along[k][j]);
+        rest = rest < 0.0f ? -rest : rest;
+        left = rest > left ? rest : left;
+    }
+    return left;
+}
+
 /* Returns 1 at the end of a block. A block begins anew if a channel is left out or has no sample. */
 static STRETCH_APART int stretch_shifts_step(stretch_shifts_state *b, const stretch_state *s,
                                              stretch_shifts *told)
 {
-    float most = 1.0f;
-    int k;
+    float shares[STRETCH_CHANNELS], left[STRETCH_CHANNELS], most = 0.0f;
+    int exceeds = 0, k;
     b->samples += 1u;
     if (b->samples < STRETCH_SHIFT_SAMPLES) {
         return 0;
@@ -69,19 +84,24 @@ static STRETCH_APART int stretch_shifts_step(stretch_shifts_state *b, const stre
         return 0;
     }
     told->shifted = 0u;
-    told->most = -1;
     for (k = 0; k < STRETCH_CHANNELS; k++) {
-        const float off = b->sums[k] * STRETCH_SHIFT_PER_BLOCK - STRETCH_FLOAT(stretch_shift_usual[k]);
-        const float times = (off < 0.0f ? -off : off) / STRETCH_FLOAT(stretch_shift_limits[k]);
-        told->off[k] = off;
-        if (times > 1.0f) {
-            told->shifted = (uint16_t)(told->shifted | (1u << k));
-        }
-        if (times > most && STRETCH_CHANNELS > 2) {
-            most = times;
-            told->most = (int8_t)k;
-        }
+        told->off[k] = b->sums[k] * STRETCH_SHIFT_PER_BLOCK - STRETCH_FLOAT(stretch_shift_usual[k]);
+        shares[k] = told->off[k] / STRETCH_FLOAT(stretch_shift_limits[k]);
+        exceeds |= shares[k] > 1.0f || shares[k] < -1.0f;
     }
     stretch_shifts_init(b);
+    if (!exceeds) {
+        return 1;
+    }
+    for (k = 0; k < STRETCH_CHANNELS; k++) {
+        left[k] = stretch_shift_left(shares, k);
+        most = k == 0 || left[k] < most ? left[k] : most;
+    }
+    most = most + most > 1.0f ? most + most : 1.0f;
+    for (k = 0; k < STRETCH_CHANNELS; k++) {
+        if (left[k] <= most) {
+            told->shifted = (uint16_t)(told->shifted | (1u << k));
+        }
+    }
     return 1;
 }

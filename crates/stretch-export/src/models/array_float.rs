@@ -17,7 +17,12 @@ pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> 
     constants
         .define("CHANNELS", count as i32, "samples of a step, in this order")
         .define("STATES", 1 + numbers.relaxations as i32, "states of a channel: signal and memory")
-        .define("TERMS", numbers.terms as i32, "terms of a channel");
+        .define("TERMS", numbers.terms as i32, "terms of a channel")
+        .define(
+            "RECOVERY",
+            numbers.samples_to_recover,
+            "good samples after which a channel is used again",
+        );
     let names = calibration.spec().channels.iter().map(|c| comment_safe(c.signal.as_str()));
     let names: Vec<String> = names.map(|name| format!("\"{name}\"")).collect();
     constants.word("SIGNALS", format!("{{{}}}", names.join(", ")), "columns of the channels");
@@ -111,7 +116,8 @@ fn shifts<const N: usize>(constants: &mut Constants, watch: &ShiftWatch<f32, N>)
         .define("SHIFT_VALUES", watch.values_a_block, "values in a block")
         .define("SHIFT_PER_BLOCK", watch.per_block, "1 / SHIFT_VALUES")
         .array("float", "shift_usual", &watch.usual[..count])
-        .array("float", "shift_limits", &watch.limits[..count]);
+        .array("float", "shift_limits", &watch.limits[..count])
+        .rows("float", "shift_along", &each(&watch.along[..count], |own| own[..count].to_vec()));
 }
 
 fn each<T, R>(of: &[T], number: impl Fn(&T) -> R) -> Vec<R> {

@@ -28,7 +28,7 @@ fn is_usable<T: Real>(sample: T) -> bool {
 pub enum ArrayLoss {
     /// The channel's samples are missing.
     Missing,
-    /// The channel's samples are impossible: it is cut off, or at the end of the converter.
+    /// The channel's samples are impossible several times in a row: it is cut off, or at the end of the converter.
     Outside,
     /// The channel repeats one value while others change: it is stuck, or at the end of its converter.
     Still,

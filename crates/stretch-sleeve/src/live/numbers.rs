@@ -9,6 +9,9 @@ use crate::{
 
 use super::samples_a_tick;
 
+/// Ticks without a fault, of about 10 ms each, after which a lost channel is used again.
+const RECOVERY_TICKS: u32 = 200;
+
 /// The numbers of an [`ArrayReceptor`](crate::ArrayReceptor).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ArrayNumbers<T, const N: usize> {
@@ -18,6 +21,9 @@ pub struct ArrayNumbers<T, const N: usize> {
     pub relaxations: usize,
     /// Samples between two comparisons of the channels.
     pub samples_a_tick: u16,
+    /// Samples in a row without a fault after which a lost channel that has not slipped is used again: about two
+    /// seconds, which is longer than any limit for equal samples.
+    pub samples_to_recover: u32,
     /// Share of the distance to its input that each low-pass covers in a sample.
     pub shares: [T; ARRAY_RELAXATIONS],
     /// Number of terms of a channel.
@@ -81,6 +87,7 @@ impl<T: Real, const N: usize> ArrayNumbers<T, N> {
             }
         });
         let period_s = calibration.spec().sample_rate_hz.period_s();
+        let samples_a_tick = samples_a_tick(calibration.spec().sample_rate_hz.hz());
         let shares = calibration.spec().relaxations_s.iter().map(|&tau| lag_share(period_s, tau));
         let nothing = ArrayGainNumbers {
             constant: T::zero(),
@@ -104,7 +111,8 @@ impl<T: Real, const N: usize> ArrayNumbers<T, N> {
         Self {
             channels: calibration.spec().channels.len().min(N),
             relaxations: calibration.spec().relaxations_s.len(),
-            samples_a_tick: samples_a_tick(calibration.spec().sample_rate_hz.hz()),
+            samples_a_tick,
+            samples_to_recover: RECOVERY_TICKS * u32::from(samples_a_tick),
             shares: rounded(shares),
             terms,
             products,

@@ -15,19 +15,22 @@ use super::{
 /// A receptor of up to `N` gauges that share a recorder.
 ///
 /// For each sample:
-/// 1. Faulty channels are excluded ("lost") until [`ArrayMemory::readmit`] is called. A channel is lost if
-///    - its sample is missing more than [`MAX_BRIDGED`] times in a row,
-///    - it leaves its possible range,
+/// 1. Faulty channels are excluded ("lost"). A channel is lost if
+///    - its sample is missing or outside its possible range more than [`MAX_BRIDGED`] times in a row,
 ///    - it repeats one value ([`Repeats`]) while another channel changes (if all channels repeat their values, the
 ///      recorder repeats its samples, and no channel is lost), or
 ///    - it slips: its difference from the value that the other channels predict jumps ([`Jump`]) by more than
 ///      `largest_jump`. A slip also changes these differences of other channels, so only the channel whose slip explains
 ///      the largest part of all jumps is excluded. If only two channels move together, it cannot be determined which of
 ///      them slipped. As soon as a channel is lost, no further slips are searched for.
+///
+///    A channel that slipped stays lost until [`ArrayMemory::readmit`] is called. Any other lost channel is used again,
+///    as if its next sample were its first, after about two seconds without such a fault
+///    ([`ArrayNumbers::samples_to_recover`]).
 /// 2. The states of each channel are computed, each shifted and scaled into its domain.
 /// 3. The gains for the remaining channels are selected: for all, for all but one, or for the best single channel.
 ///
-/// A missing sample is replaced by the channel's last one. If the samples of all channels in use are missing, this is a
+/// A missing sample, or one outside the possible range, is replaced by the channel's last one. If the samples of all channels in use are missing, this is a
 /// fault of the recorder and no channel is lost: [`MAX_BRIDGED`] such samples are replaced, and one more clears the
 /// signals but not the list of lost channels. Cost: two products and two sums for each term of a channel in use.
 ///
@@ -64,6 +67,8 @@ struct ChannelMemory<T> {
     last: T,
     low_passes: [T; ARRAY_RELAXATIONS],
     missing: u8,
+    /// While the channel is lost: the number of samples in a row without a fault.
+    good: u32,
     repeats: Repeats<T>,
     jump: Jump<T>,
 }
@@ -104,6 +109,7 @@ impl<T: Real> ChannelMemory<T> {
             last: T::nan(),
             low_passes: [T::zero(); ARRAY_RELAXATIONS],
             missing: 0,
+            good: 0,
             repeats: Repeats::new(),
             jump: Jump::new(),
         }
@@ -149,23 +155,41 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         others_change: bool,
     ) -> Option<ArrayLoss> {
         let of = &self.0.of[k];
-        if !is_usable(sample) {
+        if !is_usable(sample) || sample < of.least || sample > of.most {
             own.missing = own.missing.saturating_add(1);
             if own.missing > MAX_BRIDGED {
-                return Some(ArrayLoss::Missing);
+                let is_outside = is_usable(sample);
+                return Some(if is_outside { ArrayLoss::Outside } else { ArrayLoss::Missing });
             }
-        } else {
-            own.missing = 0;
-            if sample < of.least || sample > of.most {
-                return Some(ArrayLoss::Outside);
-            }
-            let repeats = own.repeats.step(sample, others_change);
-            if of.still_samples > 0 && repeats >= of.still_samples {
-                return Some(ArrayLoss::Still);
-            }
+            own.pass(own.last, self.shares());
+            return None;
         }
-        own.pass(if is_usable(sample) { sample } else { own.last }, self.shares());
+        own.missing = 0;
+        let repeats = own.repeats.step(sample, others_change);
+        if of.still_samples > 0 && repeats >= of.still_samples {
+            return Some(ArrayLoss::Still);
+        }
+        own.pass(sample, self.shares());
         None
+    }
+
+    /// Takes a sample of a lost channel. Returns whether enough samples in a row have had no fault.
+    fn has_recovered(
+        &self,
+        k: usize,
+        own: &mut ChannelMemory<T>,
+        sample: T,
+        others_change: bool,
+    ) -> bool {
+        let of = &self.0.of[k];
+        let is_possible = is_usable(sample) && sample >= of.least && sample <= of.most;
+        let repeats = if is_possible { own.repeats.step(sample, others_change) } else { 0 };
+        if !is_possible || of.still_samples > 0 && repeats >= of.still_samples {
+            *own = ChannelMemory::new();
+            return false;
+        }
+        own.good = own.good.saturating_add(1);
+        own.good >= self.0.samples_to_recover
     }
 
     fn shares(&self) -> &[T] {
@@ -382,9 +406,15 @@ impl<T: Real, const N: usize> Stage<[T; N]> for ArrayReceptor<T, N> {
         let count = self.0.channels;
         let (mut waiting, mut change, mut heard) = (false, false, false);
         for k in 0..count {
-            let in_use = memory.lost[k].is_none();
-            change |= in_use && samples[k] != memory.of[k].last;
-            heard |= in_use && is_usable(samples[k]);
+            let has_sample = memory.lost[k].is_none() && is_usable(samples[k]);
+            change |= has_sample && samples[k] != memory.of[k].last;
+        }
+        for k in 0..count {
+            let may_recover = memory.lost[k].is_some_and(|loss| loss != ArrayLoss::Slipped);
+            if may_recover && self.has_recovered(k, &mut memory.of[k], samples[k], change) {
+                memory.readmit(k);
+            }
+            heard |= memory.lost[k].is_none() && is_usable(samples[k]);
         }
         if !heard {
             return self.silence(memory);

@@ -3,7 +3,7 @@
 use stretch_core::{Design, Real};
 use stretch_receptor::numbers::rounded;
 
-use crate::ArrayCalibration;
+use crate::{ARRAY_TERMS, ArrayCalibration, ArrayGains};
 
 use super::receptor::{ArrayMemory, ArrayReceptor};
 
@@ -16,8 +16,15 @@ const VALUES_A_SECOND: f64 = 10.0;
 /// others. Its difference is `d = alone - without`: the estimate from this gauge alone minus the
 /// estimate from all others ([`ArrayReceptor::differences`]), taken ten times a second. The
 /// deviation of the gauge is the mean of `d` in a block minus the usual mean, in the reference's
-/// unit. The gauge has shifted if its deviation exceeds the limit in the calibration
+/// unit, and `r` is the deviation divided by the limit in the calibration
 /// ([`ArrayShifts`](crate::ArrayShifts)), which also states the rate of false alarms.
+///
+/// If `|r|` of any gauge exceeds 1, some gauge has shifted. A shift of one gauge changes the
+/// differences of all gauges, and that of another gauge may change more relative to its limit. The
+/// shift of gauge `k` changes `r` along a unit vector `m_k` that follows from the gains. Without
+/// this shift, `e_k = max |r - (m_k'r) m_k|` would remain. The gauges with the smallest `e`, and all
+/// gauges with `e` at most 1 or at most twice the smallest one, may have shifted. If there are
+/// several, the data cannot tell which of them has.
 ///
 /// A gauge that deviates from the first sample of a block on is reported at the end of that block.
 /// A report therefore takes at most two blocks. The signals alone cannot show a zero shift that all
@@ -39,7 +46,9 @@ const VALUES_A_SECOND: f64 = 10.0;
 ///     last = watch.step(&mut blocks, &receptor, &memory).or(last);
 /// }
 /// let shifts = last.expect("two blocks of 5 s have ended");
-/// assert!(shifts.has_shifted(0) && (shifts.off[0] - 18.0).abs() < 1.0);
+/// assert!(shifts.may_have_shifted(0) && (shifts.off[0] - 18.0).abs() < 1.0);
+/// // it is the first or the second
+/// assert!(shifts.may_have_shifted(1));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShiftWatch<T, const N: usize> {
@@ -53,6 +62,9 @@ pub struct ShiftWatch<T, const N: usize> {
     pub usual: [T; N],
     /// Largest deviation of a block's mean from the usual mean.
     pub limits: [T; N],
+    /// For each gauge: the unit vector along which a shift of this gauge changes the deviations,
+    /// each divided by its limit.
+    pub along: [[T; N]; N],
     /// Reciprocal of the number of values in a block.
     pub per_block: T,
 }
@@ -72,17 +84,14 @@ pub struct Shifts<T, const N: usize> {
     /// Deviation of each gauge from the prediction of the others, in the reference's unit. It is a
     /// lower bound, because states outside their domains are clamped.
     pub off: [T; N],
-    /// One bit for each gauge whose deviation exceeds its limit. The lowest bit is that of the
-    /// first gauge.
+    /// One bit for each gauge that may have shifted; 0 if no deviation exceeds its limit. The lowest
+    /// bit is that of the first gauge.
     pub shifted: u16,
-    /// The gauge with the largest ratio of deviation to limit; `None` with fewer than three gauges,
-    /// or if no gauge exceeds its limit.
-    pub most: Option<usize>,
 }
 
 impl<T, const N: usize> Shifts<T, N> {
-    /// Returns whether the deviation of a gauge exceeds its limit.
-    pub fn has_shifted(&self, channel: usize) -> bool {
+    /// Returns whether a gauge may have shifted. It has, if this holds for no other gauge.
+    pub fn may_have_shifted(&self, channel: usize) -> bool {
         channel < 16 && self.shifted & (1 << channel) != 0
     }
 }
@@ -122,6 +131,7 @@ impl<T: Real, const N: usize> ShiftWatch<T, N> {
             values_a_block,
             usual: rounded(of.usual.iter().copied()),
             limits: rounded(of.limits.iter().copied()),
+            along: along(calibration, &of.limits),
             per_block: T::from_f64(1.0 / f64::from(values_a_block)),
         })
     }
@@ -156,20 +166,79 @@ impl<T: Real, const N: usize> ShiftWatch<T, N> {
     }
 
     fn judged(&self, sums: &[T; N]) -> Shifts<T, N> {
-        let mut shifts = Shifts { off: [T::zero(); N], shifted: 0, most: None };
-        let mut most = T::one();
+        let mut shifts = Shifts { off: [T::zero(); N], shifted: 0 };
+        let mut shares = [T::zero(); N];
+        let mut exceeds = false;
         for (k, sum) in sums.iter().enumerate().take(self.channels) {
-            let off = *sum * self.per_block - self.usual[k];
-            shifts.off[k] = off;
-            let times = off.abs() / self.limits[k];
-            if times > T::one() {
-                shifts.shifted |= 1 << k;
-            }
-            if times > most && self.channels > 2 {
-                most = times;
-                shifts.most = Some(k);
-            }
+            shifts.off[k] = *sum * self.per_block - self.usual[k];
+            shares[k] = shifts.off[k] / self.limits[k];
+            exceeds |= shares[k].abs() > T::one();
+        }
+        if !exceeds {
+            return shifts;
+        }
+        let mut left = [T::zero(); N];
+        let mut least = T::zero();
+        for k in 0..self.channels {
+            left[k] = self.left(k, &shares);
+            least = if k == 0 { left[k] } else { least.min(left[k]) };
+        }
+        let most = (least + least).max(T::one());
+        for (k, left) in left.iter().enumerate().take(self.channels) {
+            shifts.shifted |= u16::from(*left <= most) << k;
         }
         shifts
     }
+
+    /// Returns the largest deviation, as a share of its limit, that a shift of gauge `k` does not
+    /// explain.
+    fn left(&self, k: usize, shares: &[T; N]) -> T {
+        let along = &self.along[k];
+        let mut size = T::zero();
+        for j in 0..self.channels {
+            size = size + along[j] * shares[j];
+        }
+        let mut left = T::zero();
+        for j in 0..self.channels {
+            left = left.max((shares[j] - size * along[j]).abs());
+        }
+        left
+    }
+}
+
+/// Returns for each gauge the unit vector along which its shift changes the deviations divided by
+/// their limits: by the slope of its own estimate, and by minus the slope of the estimates of which
+/// it is a part. A slope is the mean over the domain of the signal.
+fn along<T: Real, const N: usize>(
+    calibration: &ArrayCalibration<N>,
+    limits: &[f64],
+) -> [[T; N]; N] {
+    let spec = calibration.spec();
+    // The odd powers of the signal alone, without a memory.
+    let mut is_odd = [false; ARRAY_TERMS];
+    let mut powers = [0u8; 1 + ARRAY_TERMS];
+    let mut term = 0;
+    spec.shape().each_product(|parent, state| {
+        // Products with a memory keep an even number.
+        let power =
+            if state == 0 && (parent == 0 || powers[parent] > 0) { 1 + powers[parent] } else { 0 };
+        term += 1;
+        powers[term] = power;
+        is_odd[term - 1] = power % 2 == 1;
+    });
+    let slope = |gains: &ArrayGains<N>, k: usize| -> f64 {
+        let odd = gains.terms[k].iter().zip(is_odd).filter(|(_, is_odd)| *is_odd);
+        odd.map(|(gain, _)| gain).sum()
+    };
+    let mut out = [[T::zero(); N]; N];
+    for (k, out) in out.iter_mut().enumerate().take(spec.channels.len()) {
+        let mut own = [0.0; N];
+        for (j, own) in own.iter_mut().enumerate().take(spec.channels.len()) {
+            let moved = if j == k { slope(&spec.alone[k], k) } else { -slope(&spec.without[j], k) };
+            *own = moved / limits[j];
+        }
+        let length = Real::sqrt(own.iter().map(|x| x * x).sum::<f64>()).max(f64::MIN_POSITIVE);
+        *out = rounded(own.iter().map(|x| x / length));
+    }
+    out
 }

@@ -1,14 +1,19 @@
 //! `stretch evaluate`: measures the errors of a calibration on trials with a reference.
 
-use std::path::PathBuf;
+use std::{fmt::Display, path::PathBuf};
 
+use anyhow::ensure;
 use stretch_calibrate::{
-    Evaluation, MethodErrors, TrialErrors, evaluate, evaluation_doubts, read_calibration,
+    Doubt, Evaluation, MethodErrors, TrialErrors, evaluate, evaluation_doubts,
 };
-use stretch_data::Split;
+use stretch_data::{Split, Trial};
 use stretch_report::{comparison_table, errors_in_words, method_table};
+use stretch_sleeve::{
+    ArrayCalibration, ArraySpec, MAX_CHANNELS, SleeveCalibration, apply_array, evaluate_arrays,
+};
 
 use super::{
+    apply_several::warnings,
     json::Json,
     reading::{Recorded, read_trials, with_columns_to_name},
     shared::{say_below, say_first, short_name},
@@ -20,6 +25,8 @@ use crate::table::table_text;
 ///
 /// Prints the paper's measures for the raw signal (scaled so that its extremes match
 /// those of the reference) and for each calibration: average error, RMSE, R^2, lag.
+/// For a calibration of several gauges, it also prints them for each gauge alone, in
+/// place of the raw signal.
 /// Paired t tests compare them, on samples as in the paper, and on means of half-second
 /// blocks because the samples of one motion are not independent.
 ///
@@ -40,28 +47,86 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let mut calibrations = Vec::new();
+    let (mut one, mut several) = (Vec::new(), Vec::new());
     for path in &args.calibration {
-        calibrations.push((short_name(path), read_calibration(path)?));
+        match SleeveCalibration::read(path)? {
+            SleeveCalibration::One(gauge) => {
+                one.push((short_name(path), gauge.calibration().clone()))
+            }
+            SleeveCalibration::Many(many) => several.push((short_name(path), many)),
+        }
     }
+    ensure!(
+        one.is_empty() || several.is_empty(),
+        "--calibration: {} is a calibration of several gauges, and {} is not: evaluate them in two runs",
+        several[0].0,
+        one[0].0
+    );
     let mut columns = args.recorded.options();
-    if let Some((_, first)) = calibrations.first() {
-        columns = columns.untimed_hz(first.spec().sample_rate_hz.hz());
+    let rates = one.iter().map(|(_, own)| own.spec().sample_rate_hz);
+    if let Some(rate) = rates.chain(several.iter().map(|(_, own)| own.spec().sample_rate_hz)).next()
+    {
+        columns = columns.untimed_hz(rate.hz());
     }
-    for (_, calibration) in &calibrations {
+    for (_, calibration) in &one {
         columns = columns.require(calibration.spec().signal.as_str());
         columns = columns.require(calibration.spec().reference.as_str());
+    }
+    for name in several.iter().flat_map(|(_, calibration)| columns_of(calibration)) {
+        columns = columns.require(name);
     }
     let renamed = "a calibration needs the columns that it was fitted to: rename them, and convert their units, with stretch convert --column NEW=OLD*FACTOR";
     let trials = read_trials(&args.trials, Split::Test, &columns)
         .map_err(|error| with_columns_to_name(error, renamed))?;
-    let named: Vec<_> = calibrations.iter().map(|(name, c)| (name.as_str(), c)).collect();
-    let evaluation = evaluate(&named, &trials)?;
-    // Printed on standard error, so that the output on standard output is unchanged.
-    for doubt in evaluation_doubts(&named, &trials, &evaluation) {
-        warn(format!("stretch: {doubt}"));
+    // Doubts are printed on standard error, so that the output on standard output is unchanged.
+    let tell = |doubt: &dyn Display| warn(format!("stretch: {doubt}"));
+    if several.is_empty() {
+        let named: Vec<_> = one.iter().map(|(name, c)| (name.as_str(), c)).collect();
+        let evaluation = evaluate(&named, &trials)?;
+        evaluation_doubts(&named, &trials, &evaluation).iter().for_each(|doubt| tell(doubt));
+        return args.json.answer(&evaluation, || print(&evaluation, named.len() + 1));
     }
-    args.json.answer(&evaluation, || print(&evaluation))
+    let named: Vec<_> = several.iter().map(|(name, c)| (name.as_str(), &**c)).collect();
+    let evaluation = evaluate_arrays(&named, &trials)?;
+    for (name, calibration) in &named {
+        for trial in &trials {
+            let applied = apply_array(calibration, trial)?;
+            warnings(calibration, trial, &applied)
+                .for_each(|text| tell(&format!("{name}: {text}")));
+        }
+    }
+    array_doubts(&named, &trials, &evaluation).iter().for_each(|doubt| tell(doubt));
+    args.json.answer(&evaluation, || print(&evaluation, named.len()))
+}
+
+/// Returns the columns of the gauges of a calibration, and of its reference.
+fn columns_of(calibration: &ArrayCalibration<MAX_CHANNELS>) -> impl Iterator<Item = &str> {
+    let ArraySpec { channels, reference, .. } = calibration.spec();
+    channels.iter().map(|channel| channel.signal.as_str()).chain([reference.as_str()])
+}
+
+/// Returns doubts about calibrations of several gauges, and about each gauge alone.
+fn array_doubts(
+    calibrations: &[(&str, &ArrayCalibration<MAX_CHANNELS>)],
+    trials: &[Trial],
+    evaluation: &Evaluation,
+) -> Vec<Doubt> {
+    let mut all = Vec::new();
+    for (name, calibration) in calibrations {
+        let spec = calibration.spec();
+        let columns: Vec<&str> = columns_of(calibration).collect();
+        let fitted = Doubt::of_fitted(&spec.provenance, &columns, trials);
+        all.extend(fitted.map(|doubt| doubt.of(name)));
+    }
+    let specs = || calibrations.iter().map(|(_, own)| own.spec());
+    let fused = specs().map(|spec| spec.all.sd);
+    let alone = specs().flat_map(|spec| spec.alone.iter().map(|gains| gains.sd));
+    for (errors, sd) in evaluation.pooled.iter().zip(fused.chain(alone)) {
+        let outside = Doubt::of_clamped(errors.clamped, errors.samples);
+        let doubts = Doubt::of_errors(errors, sd, &evaluation.unit).chain(outside);
+        all.extend(doubts.map(|doubt| doubt.of(&errors.method)));
+    }
+    all
 }
 
 /// Formats the errors on some trials as the table of the published method ("the paper").
@@ -70,12 +135,15 @@ pub(super) fn table_of_errors(title: &str, methods: &[MethodErrors], unit: &str)
     table_text(&method_table(title, methods, &names, unit))
 }
 
-/// Prints the error as a sentence and the table of all trials. With `-v`, also prints a table for
-/// each trial, and tests whether the methods differ.
-fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
+/// Largest number of methods that are shown without `-v`.
+const MOST_SHOWN: usize = 7;
+
+/// Prints the error of the best of the first `compared` methods as a sentence, and the table of all trials. With `-v`,
+/// also prints a table for each trial, and tests whether the methods differ.
+fn print(evaluation: &Evaluation, compared: usize) -> anyhow::Result<()> {
     let Evaluation { unit, trials, pooled, comparisons } = evaluation;
     let name = |i: usize| pooled[i].method.clone();
-    if let Some(errors) = errors_in_words(pooled, unit, name) {
+    if let Some(errors) = errors_in_words(&pooled[..compared], unit, name) {
         say_first(errors)?;
     }
     let mut blocks = Vec::new();
@@ -87,7 +155,11 @@ fn print(evaluation: &Evaluation) -> anyhow::Result<()> {
         [one] => one.trial.as_str(),
         _ => "All trials",
     };
-    blocks.push(table_of_errors(title, pooled, unit));
+    let shown = if is_verbose() { pooled.len() } else { pooled.len().min(MOST_SHOWN) };
+    blocks.push(table_of_errors(title, &pooled[..shown], unit));
+    if shown < pooled.len() {
+        blocks.push(format!("{} more with -v", pooled.len() - shown));
+    }
     if is_verbose() {
         blocks.push(
             "Average error: mean |reference - estimate| over the range of the estimate, as in the paper. Bias: mean of estimate minus \

@@ -1,6 +1,6 @@
 //! Acceptance criteria: whether a calibration can be used, and whether a log belongs to it.
 
-use stretch_core::{Calibration, Label};
+use stretch_core::{Label, Provenance};
 use stretch_data::Trial;
 
 use crate::{error::four_digits, fit::FitReport, prepare::without_gross_errors};
@@ -88,19 +88,13 @@ const ALIKE: f64 = 1.25;
 /// bias^2 >= rmse^2 / 2,  or  sqrt(rmse^2 - bias^2) <= 1.25 fit < rmse
 /// ```
 ///
-/// Here `fit` is the RMSE of the fit. Typical causes are a sensor that was put on again, and a reference in centimetres
+/// Here `fit` is the RMSE of the fit, in the unit of the reference. Typical causes are a sensor that was put on again, and a reference in centimetres
 /// with a calibration in millimetres.
-pub(super) fn off_throughout(
-    errors: &MethodErrors,
-    calibration: &Calibration,
-    unit: &str,
-) -> Option<String> {
+pub(super) fn off_throughout(errors: &MethodErrors, fit_rmse: f64, unit: &str) -> Option<String> {
     let MethodErrors { bias, rmse, rmse_percent, .. } = *errors;
     let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
     let unshifted = (rmse * rmse - bias * bias).max(0.0).sqrt();
-    let spec = calibration.spec();
-    let reference_per_rmse = spec.target.reference_per_normalised(spec.target_range).abs();
-    let alike = ALIKE * spec.model.fit_rmse() * reference_per_rmse;
+    let alike = ALIKE * fit_rmse;
     let is_shift = unshifted <= bias.abs() || (unshifted <= alike && alike < rmse);
     (is_far && is_shift).then(|| {
         let with_unit = |x: f64| format!("{} {unit}", four_digits(x)).trim_end().to_owned();
@@ -130,18 +124,19 @@ pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
 /// Returns a sentence that lists the trials to which a calibration was fitted; `None` if there are none. A calibration
 /// holds the names of its first trials and the checksums of their samples. A trial is therefore recognised under
 /// another name, and a trial that has only the name of a fitted trial is reported as such.
-pub(super) fn fitted_on(calibration: &Calibration, trials: &[Trial]) -> Option<String> {
-    let (provenance, columns) = (
-        &calibration.spec().provenance,
-        [calibration.spec().signal.as_str(), calibration.spec().reference.as_str()],
-    );
+pub(super) fn fitted_on(
+    provenance: &Provenance,
+    columns: &[&str],
+    trials: &[Trial],
+) -> Option<String> {
     let is_known = |trial: &Trial| {
-        let checksum = trial.checksum(&columns);
+        let checksum = trial.checksum(columns);
         checksum.is_some_and(|sum| provenance.checksums().contains(&sum))
     };
     // A fit leaves out rows with gross errors, and its checksums are those of the remaining rows.
     let cleaned = |trial: &Trial| {
-        let (kept, _) = without_gross_errors(vec![trial.clone()], &[columns[1], columns[0]]);
+        let reversed: Vec<&str> = columns.iter().rev().copied().collect();
+        let (kept, _) = without_gross_errors(vec![trial.clone()], &reversed);
         kept.iter().any(is_known)
     };
     let has_checksums = !provenance.checksums().is_empty();

@@ -3,14 +3,14 @@
 use std::fmt;
 
 use serde::Serialize;
-use stretch_core::Calibration;
+use stretch_core::{Calibration, Provenance};
 use stretch_data::{Trial, out_of_order, rate_of};
 use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::{
     acceptance::{beside_a_constant, fitted_on, not_its_own, off_throughout, worse_than_the_mean},
     apply::{Applied, at_rate},
-    evaluate::Evaluation,
+    evaluate::{Evaluation, MethodErrors},
     reach::Reach,
 };
 use crate::error::PACE_TOLERANCE;
@@ -35,8 +35,29 @@ impl Doubt {
         not_its_own(clamped, samples).map(|text| Self::new("outside_range", text))
     }
 
+    /// Returns a doubt about errors on trials that were used for the fit. `columns` are the signals and the reference.
+    pub fn of_fitted(provenance: &Provenance, columns: &[&str], trials: &[Trial]) -> Option<Self> {
+        fitted_on(provenance, columns, trials).map(|text| Self::new("fitted_trials", text))
+    }
+
+    /// Returns doubts about the errors of a method: a shift, or errors that say nothing. `fit_rmse` is the RMSE of its
+    /// fit, in the unit of the reference.
+    pub fn of_errors(
+        errors: &MethodErrors,
+        fit_rmse: f64,
+        unit: &str,
+    ) -> impl Iterator<Item = Self> {
+        let words = [
+            ("constant_error", off_throughout(errors, fit_rmse, unit)),
+            ("worse_than_the_mean", worse_than_the_mean(errors)),
+            ("constant_reference", beside_a_constant(errors)),
+        ];
+        words.into_iter().filter_map(|(code, text)| Some(Self::new(code, text?)))
+    }
+
     /// Prefixes the text with the name of a trial or a method.
-    fn of(self, name: &str) -> Self {
+    #[must_use]
+    pub fn of(self, name: &str) -> Self {
         Self { text: format!("{name}: {}", self.text), ..self }
     }
 }
@@ -142,7 +163,9 @@ pub fn evaluation_doubts(
             let mut pace = Pace::of(&at_own_rate(calibration, trial));
             Some(trial.time_s.iter().find_map(|time_s| pace.take(*time_s))?.of(&trial.name))
         });
-        let fitted = fitted_on(calibration, trials).map(|text| Doubt::new("fitted_trials", text));
+        let spec = calibration.spec();
+        let columns = [spec.signal.as_str(), spec.reference.as_str()];
+        let fitted = Doubt::of_fitted(&spec.provenance, &columns, trials);
         all.extend(paces.chain(fitted).map(|doubt| doubt.of(name)));
     }
     // The first method is the raw signal.
@@ -151,12 +174,9 @@ pub fn evaluation_doubts(
         let signal = calibration.spec().signal.as_str();
         let signals = trials.iter().filter_map(|trial| trial.channel(signal));
         signals.flatten().for_each(|value| reach.take(*value));
-        let words = [
-            ("constant_error", off_throughout(errors, calibration, &evaluation.unit)),
-            ("worse_than_the_mean", worse_than_the_mean(errors)),
-            ("constant_reference", beside_a_constant(errors)),
-        ];
-        let said = words.into_iter().filter_map(|(code, text)| Some(Doubt::new(code, text?)));
+        let spec = calibration.spec();
+        let unit = spec.target.reference_per_normalised(spec.target_range).abs();
+        let said = Doubt::of_errors(errors, unit * spec.model.fit_rmse(), &evaluation.unit);
         let outside = outside(&reach, errors.clamped, errors.samples);
         // A shift comes first, because it also puts samples outside the range.
         all.extend(said.chain(outside).map(|doubt| doubt.of(name)));

@@ -17,7 +17,7 @@ use super::apply::apply;
 const BLOCK_S: f64 = 0.5;
 
 /// Largest lag that is searched, in seconds.
-const MAX_LAG_S: f64 = 1.0;
+pub const MAX_LAG_S: f64 = 1.0;
 
 /// Errors of one method, on one trial or pooled.
 #[derive(Debug, Clone, Serialize)]
@@ -112,10 +112,31 @@ pub struct TrialErrors {
 }
 
 /// The estimates of one method for one trial.
-struct Estimates {
-    values: Vec<f64>,
-    rates: Vec<f64>,
-    clamped: u64,
+#[derive(Debug)]
+pub struct Estimates {
+    /// One estimate for each sample; NaN if withheld.
+    pub values: Vec<f64>,
+    /// Rate of each estimate; NaN if there is none.
+    pub rates: Vec<f64>,
+    /// Samples whose inputs were outside the calibrated domain.
+    pub clamped: u64,
+}
+
+/// Methods that are compared with a reference.
+#[derive(Debug)]
+pub struct Methods<'a> {
+    /// Names of the methods. Methods before the first calibration are not calibrated.
+    pub names: Vec<&'a str>,
+    /// Index of the first calibration.
+    pub first: usize,
+    /// Column of the signal that plots show.
+    pub signal: &'a str,
+    /// Column of the reference.
+    pub reference: &'a str,
+    /// Sample rate of the calibrations, in Hz.
+    pub rate_hz: f64,
+    /// Largest lag that is searched, in seconds; 0 for no lags.
+    pub most_s: f64,
 }
 
 /// Evaluates calibrations against the reference of each trial.
@@ -152,45 +173,66 @@ fn evaluate_lag(
     most_s: f64,
 ) -> Result<Evaluation, CalibrateError> {
     let (_, first) = calibrations.first().ok_or(CalibrateError::NoTrials)?;
+    let methods = Methods {
+        names: std::iter::once("raw").chain(calibrations.iter().map(|(name, _)| *name)).collect(),
+        first: 1,
+        signal: first.spec().signal.as_str(),
+        reference: first.spec().reference.as_str(),
+        rate_hz: first.spec().sample_rate_hz.hz(),
+        most_s,
+    };
+    evaluate_methods(&methods, trials, |trial, reference| {
+        let of_one = |(_, calibration): &(&str, &Calibration)| estimates(calibration, trial);
+        let raw = std::iter::once_with(|| raw(first, trial, reference));
+        raw.chain(calibrations.iter().map(of_one)).collect()
+    })
+}
+
+/// Evaluates methods against the reference of each trial. `estimates` returns the estimates of all methods from a trial
+/// and its reference.
+///
+/// # Errors
+/// Those of `estimates`, and as [`evaluate`].
+pub fn evaluate_methods(
+    all: &Methods<'_>,
+    trials: &[Trial],
+    estimates: impl Fn(&Trial, &[f64]) -> Result<Vec<Estimates>, CalibrateError>,
+) -> Result<Evaluation, CalibrateError> {
     check_rows(trials, MOST_ROWS)?;
-    let names: Vec<&str> =
-        std::iter::once("raw").chain(calibrations.iter().map(|(name, _)| *name)).collect();
+    let names = &all.names;
     let mut pooled = vec![Tally::default(); names.len()];
-    let mut tests = Tests::new(names.len(), first.spec().sample_rate_hz.hz());
+    let mut tests = Tests::new(names.len(), all.rate_hz);
     let mut rows = Vec::new();
-    let column = first.spec().reference.as_str();
     let mut unwrapped = Vec::new();
     for trial in trials {
         trial.check_lengths()?;
-        unwrapped.push(trial.unwrapped(column)?);
+        unwrapped.push(trial.unwrapped(all.reference)?);
     }
     let turn = unwrapped.iter().find_map(|(_, wrap)| wrap.map(|wrap| wrap.turn));
     for (trial, (reference, _)) in trials.iter().zip(unwrapped) {
         let mut reference = reference.into_owned();
-        let mut methods = vec![raw(first, trial, &reference)?];
-        for (_, calibration) in calibrations {
-            methods.push(estimates(calibration, trial)?);
-        }
+        let mut methods = estimates(trial, &reference)?;
         if let Some(turn) = turn {
             // The turn of an angle that wraps is unknown, so the reference is shifted to the turn of the first
             // calibration's estimates.
-            let off = reference.iter().zip(&methods[1].values).map(|(x, y)| y - x);
+            let off = reference.iter().zip(&methods[all.first].values).map(|(x, y)| y - x);
             let known: Vec<f64> = off.filter(|off| off.is_finite()).collect();
             let shift =
                 turn * (known.iter().sum::<f64>() / known.len().max(1) as f64 / turn).round();
-            let all = [&mut reference, &mut methods[0].values];
-            all.into_iter().flatten().for_each(|x| *x += shift);
+            reference.iter_mut().for_each(|x| *x += shift);
+            let uncalibrated = methods.iter_mut().take(all.first);
+            uncalibrated.flat_map(|method| &mut method.values).for_each(|x| *x += shift);
         }
         let rate_hz = sample_rate_hz(trial)?;
         let period_s = 1.0 / rate_hz;
         let mut errors = Vec::new();
-        for ((name, method), all) in names.iter().zip(&methods).zip(&mut pooled) {
-            let tally = Tally::of(&reference, method, period_s, most_s);
-            all.merge(&tally);
+        for ((name, method), pooled) in names.iter().zip(&methods).zip(&mut pooled) {
+            let tally = Tally::of(&reference, method, period_s, all.most_s);
+            pooled.merge(&tally);
             let nothing = || CalibrateError::NothingEstimated {
                 trial: trial.name.clone(),
                 rate_hz,
-                expected_hz: first.spec().sample_rate_hz.hz(),
+                expected_hz: all.rate_hz,
             };
             errors.push(tally.errors(name).ok_or_else(nothing)?);
         }
@@ -199,7 +241,7 @@ fn evaluate_lag(
             trial: trial.name.clone(),
             methods: errors,
             time_s: trial.time_s.clone(),
-            signal: trial.require(first.spec().signal.as_str())?.to_vec(),
+            signal: trial.require(all.signal)?.to_vec(),
             reference,
             rates: methods.iter().map(|m| m.rates.clone()).collect(),
             estimates: methods.into_iter().map(|m| m.values).collect(),
@@ -209,10 +251,10 @@ fn evaluate_lag(
     let pooled =
         names.iter().zip(&pooled).map(|(name, tally)| tally.errors(name).ok_or_else(nothing));
     Ok(Evaluation {
-        unit: unit_of(first.spec().reference.as_str()),
+        unit: unit_of(all.reference),
         trials: rows,
         pooled: pooled.collect::<Result<_, _>>()?,
-        comparisons: tests.compare(&names),
+        comparisons: tests.compare(names),
     })
 }
 

@@ -13,7 +13,10 @@ mod reach;
 pub use acceptance::{explains_little, explains_nothing};
 pub use apply::{Applied, Faults, LiveReceptor, apply, at_rate, on_own_ranges, pressure_column};
 pub use doubt::{Doubt, Seen, evaluation_doubts};
-pub use evaluate::{Comparison, Evaluation, MethodErrors, TrialErrors, evaluate, evaluate_errors};
+pub use evaluate::{
+    Comparison, Estimates, Evaluation, MAX_LAG_S, MethodErrors, Methods, TrialErrors, evaluate,
+    evaluate_errors, evaluate_methods,
+};
 pub use left_out::{Judged, judge_model};
 pub use model_choice::{
     Candidate, ModelChoice, ModelRow, candidate_models, choose_among, choose_model,

@@ -14,12 +14,14 @@ mod prior;
 mod record;
 mod turns;
 
-pub use array::{AppliedArray, ArrayFit, ArrayOptions, Carried, apply_array, calibrate_array};
+pub use array::{
+    AppliedArray, ArrayFit, ArrayOptions, Carried, apply_array, calibrate_array, evaluate_arrays,
+};
 pub use error::SleeveError;
 pub use gauge::{AppliedGauge, LiveGauge, apply_gauge};
 pub use prior::{
-    Assumed, ErrorSpread, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session,
-    SessionOptions, UpdateOptions, UpdateSummary, Updated,
+    Assumed, ErrorSpread, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session, SessionOptions,
+    UpdateOptions, UpdateSummary, Updated,
 };
 pub use record::{
     RecordSummary, SleeveCalibration, array_bytes, array_seal, describe_record, seal_record,

@@ -1,13 +1,17 @@
 //! Applies a calibration of several gauges to a logged trial, as it would run live.
 
-use stretch_core::{Design, Runner, Seconds, Stage};
+use stretch_calibrate::{
+    CalibrateError, Evaluation,
+    toolkit::{Estimates, MAX_LAG_S, Methods, evaluate_methods},
+};
+use stretch_core::{Design, Interval, Runner, Seconds, Stage, Values, sizes::MOST};
 use stretch_data::Trial;
 use stretch_filter::{Arrival, Cadence};
 use stretch_receptor::MAX_BRIDGED;
 
 use crate::{
     ArrayCalibration, ArrayLoss, ArrayReading, ArrayReceptor, ArrayWithheld, MAX_CHANNELS,
-    ShiftWatch, Shifts, SleeveError,
+    ShiftWatch, Shifts,
 };
 
 /// An interval between samples that differs from the period by at most this share is jitter, not a
@@ -19,7 +23,7 @@ const JITTER_TOLERANCE: f64 = 0.2;
 pub struct AppliedArray {
     /// One reading for each sample, or the reason why there is none.
     pub readings: Vec<Result<ArrayReading<f64>, ArrayWithheld>>,
-    /// For each lost channel: its index, the time, and the reason.
+    /// For each channel that was lost at least once: its index, the time of the first loss, and its reason.
     pub losses: Vec<(usize, f64, ArrayLoss)>,
     /// For each block of time: the time of the report, and the deviations of the channels from each other. Empty if the
     /// calibration does not contain the usual deviations.
@@ -30,11 +34,11 @@ pub struct AppliedArray {
 /// missing samples.
 ///
 /// # Errors
-/// [`CalibrateError::Data`](stretch_calibrate::CalibrateError::Data) if the trial lacks a channel.
+/// [`CalibrateError::Data`] if the trial lacks a channel.
 pub fn apply_array(
     calibration: &ArrayCalibration<MAX_CHANNELS>,
     trial: &Trial,
-) -> Result<AppliedArray, SleeveError> {
+) -> Result<AppliedArray, CalibrateError> {
     trial.check_lengths()?;
     let columns = calibration.spec().channels.iter().map(|c| trial.require(c.signal.as_str()));
     let columns = columns.collect::<Result<Vec<_>, _>>()?;
@@ -70,4 +74,65 @@ pub fn apply_array(
         }
     }
     Ok(applied)
+}
+
+/// Evaluates calibrations of several gauges against the reference of each trial.
+///
+/// The first methods are the calibrations. After them comes each gauge alone: the estimate of a calibration from this
+/// gauge only, even if its samples are impossible. All calibrations must have the same reference. A sample is outside
+/// the domain if a state was clamped.
+///
+/// # Errors
+/// As [`evaluate`](stretch_calibrate::evaluate()).
+pub fn evaluate_arrays(
+    calibrations: &[(&str, &ArrayCalibration<MAX_CHANNELS>)],
+    trials: &[Trial],
+) -> Result<Evaluation, CalibrateError> {
+    let (_, first) = calibrations.first().ok_or(CalibrateError::NoTrials)?;
+    let mut methods: Vec<(String, ArrayCalibration<MAX_CHANNELS>)> =
+        calibrations.iter().map(|(name, own)| ((*name).to_owned(), (*own).clone())).collect();
+    for (name, calibration) in calibrations {
+        let of = if calibrations.len() == 1 { String::new() } else { format!("{name}: ") };
+        for (k, channel) in calibration.spec().channels.iter().enumerate() {
+            methods.push((format!("{of}{} alone", channel.signal), alone(calibration, k)?));
+        }
+    }
+    let named = Methods {
+        names: methods.iter().map(|(name, _)| name.as_str()).collect(),
+        first: 0,
+        signal: first.spec().channels[0].signal.as_str(),
+        reference: first.spec().reference.as_str(),
+        rate_hz: first.spec().sample_rate_hz.hz(),
+        most_s: MAX_LAG_S,
+    };
+    let all = |trial: &Trial, _: &[f64]| {
+        methods.iter().map(|(_, own)| Ok(estimates(&apply_array(own, trial)?))).collect()
+    };
+    evaluate_methods(&named, trials, all)
+}
+
+/// Returns the calibration of one of several gauges. None of its samples is impossible.
+fn alone(
+    calibration: &ArrayCalibration<MAX_CHANNELS>,
+    k: usize,
+) -> Result<ArrayCalibration<MAX_CHANNELS>, CalibrateError> {
+    let mut spec = calibration.spec().clone();
+    let mut gains = spec.alone[k].clone();
+    gains.terms = std::iter::once(gains.terms[k].clone()).collect();
+    let mut channel = spec.channels[k].clone();
+    channel.follows = Values::new("follows", &[0.0])?;
+    channel.possible = Interval { min: -MOST, max: MOST };
+    spec.channels = std::iter::once(channel).collect();
+    spec.without.clear();
+    spec.alone = std::iter::once(gains.clone()).collect();
+    (spec.all, spec.shifts) = (gains, None);
+    Ok(ArrayCalibration::new(spec)?)
+}
+
+fn estimates(applied: &AppliedArray) -> Estimates {
+    let readings = &applied.readings;
+    let values: Vec<f64> =
+        readings.iter().map(|r| r.as_ref().map_or(f64::NAN, |r| r.estimate)).collect();
+    let clamped = readings.iter().flatten().filter(|reading| reading.clamped).count() as u64;
+    Estimates { rates: vec![f64::NAN; values.len()], values, clamped }
 }

@@ -6,7 +6,7 @@ mod parted;
 mod shifts;
 mod watch;
 
-pub use apply::{AppliedArray, apply_array};
+pub use apply::{AppliedArray, apply_array, evaluate_arrays};
 pub use fit::{ArrayFit, ArrayOptions, calibrate_array};
 pub use parted::Carried;
 

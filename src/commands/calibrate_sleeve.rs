@@ -182,12 +182,21 @@ fn sentence(made: &Made) -> String {
             let off = with_unit(rmse);
             format!("{what} is off by {off} (RMSE) on parts of the trials that were not fitted.")
         }
-        (None, Some(update)) => format!(
-            "{what}, from the prior and {:.1} s of reference, has an expected RMSE of {}; 95 % of estimates are within {}.",
-            update.seconds,
-            with_unit(update.expected_rmse),
-            with_unit(update.half_width_95)
-        ),
+        (None, Some(update)) => {
+            let what =
+                format!("{what} comes from the prior and {:.1} s of reference", update.seconds);
+            match (update.expected_rmse, update.half_width_95) {
+                (Some(rmse), Some(half_width)) => format!(
+                    "{what}. Earlier sessions with as much reference were off by {} (RMSE) on movements that were left out, and 95 % of their errors \
+                     were within {}.",
+                    with_unit(rmse),
+                    with_unit(half_width)
+                ),
+                _ => format!(
+                    "{what}. Its error cannot be estimated, because no session of the prior can be left out for this."
+                ),
+            }
+        }
         (None, None) => format!("{what} was fitted."),
     }
 }

@@ -79,7 +79,7 @@ fn learn(args: LearnArgs) -> anyhow::Result<()> {
 fn print_prior(prior: &Prior) -> anyhow::Result<()> {
     let unit = prior.unit();
     say(format!(
-        "Prior of {} sessions with the signals {}. Errors at the end of each session when it is left out:",
+        "Prior of {} sessions with the signals {}. Errors of earlier sessions on movements that were left out:",
         prior.sessions,
         prior.signals.join(", ")
     ))?;
@@ -156,10 +156,13 @@ fn print_renewal(renewed: &Renewed, unit: &str) -> anyhow::Result<()> {
     };
     say(table(&header, summary.assumed.iter().map(row)))?;
     say(format!(
-        "the estimate is shifted by {} {unit} and scaled by {:.3}; if the assumption holds, the expected RMSE is {} {unit}",
+        "the estimate is shifted by {} {unit} and scaled by {:.3}; its error cannot be estimated without a reference{}",
         number(summary.shift),
         summary.scale,
-        number(summary.expected_rmse)
+        summary.prior_rmse.map_or(String::new(), |rmse| format!(
+            ": without this renewal, earlier sessions that were left out were off by {} {unit} (RMSE)",
+            number(rmse)
+        ))
     ))?;
     renewed.notes.iter().for_each(|note| warn(format!("note: {note}")));
     Ok(())

@@ -252,8 +252,9 @@ impl Judge {
                             f64::NAN
                         }
                     };
-                    if let Ok(updated) = &updated {
-                        let half_width = updated.summary.half_width_95;
+                    if let Ok(updated) = &updated
+                        && let Some(half_width) = updated.summary.half_width_95
+                    {
                         let share = self.inside(&updated.calibration, worn, half_width)?;
                         inside.push((format!("prior, {what}, {who}, {seconds} s"), share));
                     }

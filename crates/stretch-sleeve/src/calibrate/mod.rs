@@ -20,7 +20,7 @@ pub use array::{
 pub use error::SleeveError;
 pub use gauge::{AppliedGauge, LiveGauge, apply_gauge};
 pub use prior::{
-    Assumed, ErrorSpread, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session, SessionOptions,
+    Assumed, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session, SessionOptions,
     UpdateOptions, UpdateSummary, Updated,
 };
 pub use record::{

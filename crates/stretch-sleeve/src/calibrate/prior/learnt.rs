@@ -138,7 +138,7 @@ impl Prior {
             reference: first.reference.clone(),
             sample_rate_hz: first.sample_rate_hz,
             sessions: sessions.len(),
-            expected: expected(&parts, &left, (spread.noise, &gram), unit),
+            expected: expected(&parts, &left, spread.noise, unit),
             target,
             target_range,
             estimate: Interval {

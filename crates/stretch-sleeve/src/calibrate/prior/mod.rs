@@ -18,7 +18,7 @@ mod tests;
 mod tree;
 mod update;
 
-pub use expected::{ErrorSpread, Expected};
+pub use expected::Expected;
 pub(crate) use learnt::LEAST_SESSIONS;
 pub use learnt::Prior;
 pub use renew::{Assumed, RenewOptions, RenewSummary, Renewed};

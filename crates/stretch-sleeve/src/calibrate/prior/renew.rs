@@ -82,8 +82,9 @@ pub struct RenewSummary {
     pub shift: f64,
     /// Ratio of the movement's span to its previous span.
     pub scale: f64,
-    /// Expected root mean square error, in the reference's unit, if the assumption holds.
-    pub expected_rmse: f64,
+    /// Root mean square error of the prior alone on left-out sessions ([`Expected`](super::Expected)), in the
+    /// reference's unit; `None` if the prior has no such session. The error after a renewal cannot be estimated.
+    pub prior_rmse: Option<f64>,
 }
 
 /// An assumed value of the reference.
@@ -155,13 +156,20 @@ impl Prior {
         notes.extend(self.whom(&options.path, known));
         notes.extend(may_be_reversed.then(|| REVERSED.to_owned()));
         let predicted = after.covariance.component_mul(&self.gram).sum() + self.noise;
-        let variance = predicted * self.spread(0.0, known > 0).widening;
+        let [prior_rmse, _] = self.expect(0.0, known > 0);
+        let variance = self.variance(prior_rmse).unwrap_or(predicted);
         let linear = self.linear(&after.mean, self.gram.clone(), variance);
         let linear = Linear { signals: signals.clone(), ..linear };
         let provenance = provenance(&options.date, trials, signals);
         Ok(Renewed {
             calibration: linear.record(Some(&channels), None, provenance)?,
-            summary: self.summary(&normal.mean, &after.mean, &rows, &values, (distance, variance)),
+            summary: self.summary(
+                &normal.mean,
+                &after.mean,
+                &rows,
+                &values,
+                (distance, prior_rmse),
+            ),
             notes,
         })
     }
@@ -277,7 +285,7 @@ impl Prior {
         after: &DVector<f64>,
         rows: &Rows,
         values: &[Landmark],
-        (distance, variance): (f64, f64),
+        (distance, prior_rmse): (f64, Option<f64>),
     ) -> RenewSummary {
         let unit = self.unit_of_target();
         let reference = |t: f64| self.target.to_reference(self.target_range.denormalise(t));
@@ -296,7 +304,7 @@ impl Prior {
             distance,
             shift: middle(|a| a.after) - middle(|a| a.before),
             scale: span(|a| a.after) / span(|a| a.before),
-            expected_rmse: variance.sqrt() * unit,
+            prior_rmse,
             assumed,
         }
     }

@@ -5,7 +5,7 @@ use stretch_data::{Channel, Trial};
 
 use crate::{
     ArrayOptions, Prior, RenewOptions, Session, SessionOptions, SleeveCalibration, Turns,
-    UpdateOptions, apply_array, apply_gauge, calibrate_array, calibrate_gauge,
+    UpdateOptions, UpdateSummary, apply_array, apply_gauge, calibrate_array, calibrate_gauge,
 };
 
 const HZ: f64 = 50.0;
@@ -104,7 +104,13 @@ fn seconds_of_reference_and_a_wearer_that_was_seen_each_lower_the_error() {
     let (alone, wide) = of(0.0, 9, "", &test);
     let (updated, narrow) = of(10.0, 9, "", &test);
     assert!(updated < 0.3 * alone, "{updated} of {alone}");
-    assert!(narrow.half_width_95 < 0.5 * wide.half_width_95);
+    let half_width = |told: &UpdateSummary| told.half_width_95.unwrap();
+    assert!(half_width(&narrow) < 0.5 * half_width(&wide));
+    // The errors are those of the prior's table.
+    let row = |k: usize| (prior.expected[k].rmse_new, prior.expected[k].half_width_95_new);
+    for (told, k) in [(&wide, 0), (&narrow, 1)] {
+        assert_eq!((told.expected_rmse, told.half_width_95), row(k));
+    }
     // A wearer far from the mean, in a session that the prior does not know
     let again = session(2, 3, 60.0);
     let (seen, told) = of(0.0, 2, "w2", &again);

@@ -19,7 +19,7 @@ use crate::{
 };
 
 use super::{
-    expected::{ErrorSpread, Expected, mixed_gram},
+    expected::Expected,
     learnt::{Prior, correlated, elsewhere, is_other_unit, paths_in_words, turned},
     tree::Normal,
 };
@@ -59,18 +59,25 @@ pub struct Updated {
     pub notes: Vec<String>,
 }
 
-/// Expected errors of an updated calibration.
+/// Data of an updated calibration, and the errors of left-out sessions of the prior after as many seconds of reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UpdateSummary {
     /// Duration of the reference that was used, s.
     pub seconds: f64,
     /// Number of steps of the path that the prior knows.
     pub known: usize,
-    /// Expected root mean square error, in the reference's unit: the model's prediction, widened by
-    /// its errors on left-out sessions.
-    pub expected_rmse: f64,
-    /// Half of the 95 % interval of single estimates, in the reference's unit, from the errors on left-out sessions.
-    pub half_width_95: f64,
+    /// Root mean square error of the left-out sessions ([`Expected`]), in the reference's unit; `None` if the prior has
+    /// no such session.
+    pub expected_rmse: Option<f64>,
+    /// Half of the interval that contains 95 % of these errors, in the same unit.
+    pub half_width_95: Option<f64>,
+}
+
+/// Returns `X'X/n` for a future session, from that of the prior and that of some seconds of the session. Each row of
+/// `X` contains the terms of a sample. One minute of the session has the same weight as the prior.
+fn mixed_gram(prior: &DMatrix<f64>, own: &DMatrix<f64>, seconds: f64) -> DMatrix<f64> {
+    let weight = seconds / 60.0;
+    (prior + own * weight) / (1.0 + weight)
 }
 
 /// Returns the error of data that do not fit the prior.
@@ -120,10 +127,8 @@ impl Prior {
             .as_ref()
             .map_or(0.0, |channels| channels.reference().count() as f64 / self.sample_rate_hz);
         let predicted = posterior.covariance.component_mul(&gram).sum() + self.noise;
-        let spread = self.spread(seconds, known > 0);
-        let variance = predicted * spread.widening;
-        let unit = self.unit_of_target();
-        let expected_rmse = variance.sqrt() * unit;
+        let [expected_rmse, half_width_95] = self.expect(seconds, known > 0);
+        let variance = self.variance(expected_rmse).unwrap_or(predicted);
         let columns = signals.iter().chain([reference]);
         let provenance = provenance(&options.date, trials, columns);
         let linear = Linear {
@@ -135,12 +140,7 @@ impl Prior {
         };
         Ok(Updated {
             calibration: linear.record(channels.as_ref(), None, provenance)?,
-            summary: UpdateSummary {
-                seconds,
-                known,
-                expected_rmse,
-                half_width_95: spread.multiple_95 * predicted.sqrt() * unit,
-            },
+            summary: UpdateSummary { seconds, known, expected_rmse, half_width_95 },
             notes,
         })
     }
@@ -212,12 +212,21 @@ impl Prior {
         Ok((Normal { mean, covariance }, mixed))
     }
 
-    /// Returns the spread of errors on left-out sessions after this duration of reference.
-    pub(crate) fn spread(&self, seconds: f64, known: bool) -> ErrorSpread {
-        let of = |e: &Expected| if known { e.spread_known } else { e.spread_new };
+    /// Returns the root mean square error of left-out sessions after at most this duration of reference, and half of
+    /// the interval that contains 95 % of their errors.
+    pub(crate) fn expect(&self, seconds: f64, known: bool) -> [Option<f64>; 2] {
+        let of = |e: &Expected| match known {
+            true => [e.rmse_known, e.half_width_95_known],
+            false => [e.rmse_new, e.half_width_95_new],
+        };
         // Allow 1 %, because the duration is computed from a measured sample rate.
-        let reached = self.expected.iter().rev().find(|e| e.seconds <= 1.01 * seconds);
-        reached.or(self.expected.first()).map_or(ErrorSpread::NORMAL, of)
+        let reached = self.expected.iter().filter(|e| e.seconds <= 1.01 * seconds).map(of);
+        reached.filter(|[rmse, _]| rmse.is_some()).last().unwrap_or([None; 2])
+    }
+
+    /// Returns the variance of the normalised target for a root mean square error in the reference's unit.
+    pub(crate) fn variance(&self, rmse: Option<f64>) -> Option<f64> {
+        rmse.map(|rmse| (rmse / self.unit_of_target()).powi(2))
     }
 
     pub(crate) fn refuse_columns(

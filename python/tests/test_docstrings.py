@@ -9,6 +9,7 @@ import importlib.util
 import inspect
 import pkgutil
 import re
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -103,6 +104,7 @@ def test_classes_properties_and_fields_are_described(name):
     for member, value in vars(item).items():
         if isinstance(value, property):
             assert value.__doc__, f"{name}.{member} has no docstring"
+    assert "Examples" in sections(item.__doc__), name
     if dataclasses.is_dataclass(item):
         fields = [field.name for field in dataclasses.fields(item) if not field.name.startswith("_")]
         assert missing(item.__doc__, fields, "Parameters", "Attributes") == []
@@ -126,16 +128,63 @@ def test_the_stub_describes_what_is_native(name):
             # the stub has what the module has, and `help` shows the same text
             assert inspect.cleandoc(getattr(getattr(stretch_gap, name), node.name).__doc__) == docstring
             is_property = any(isinstance(one, ast.Name) and one.id == "property" for one in node.decorator_list)
-            assert is_property or "Examples\n--------\n" in docstring
+            is_none = isinstance(node.returns, ast.Constant) and node.returns.value is None
+            wanted = {"Examples"} | (set() if is_none else {"Returns"})
+            assert is_property or wanted <= set(sections(docstring)), node.name
 
 
 OPTIONAL = {".plot(": "matplotlib", ".to_rerun(": "rerun"}
 """Calls in examples that need further packages."""
 
 
+MODULE_NAMES = {name.rpartition(".")[2] for name in MODULES} | {"entries"}
+
+
+def called(tree: ast.AST) -> set[str]:
+    """Names of the functions that a function calls; `raise` if it raises an error. Names of methods begin with a dot."""
+    found = {"raise" for node in ast.walk(tree) if isinstance(node, ast.Raise)}
+    for function in [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]:
+        if isinstance(function, ast.Name):
+            found.add(function.id)
+        elif isinstance(function, ast.Attribute):
+            is_of_module = isinstance(function.value, ast.Name) and function.value.id in MODULE_NAMES
+            found.add(function.attr if is_of_module else f".{function.attr}")
+    return found
+
+
+def reaching(target: str) -> set[str]:
+    """Names of the functions of the package that call `target`, also through others."""
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in PACKAGE.glob("*.py")]
+    classes = [node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)]
+    defined = [("", node) for tree in trees for node in tree.body] + [(".", node) for one in classes for node in one.body]
+    functions = [(dot + node.name, called(node)) for dot, node in defined if isinstance(node, ast.FunctionDef)]
+    found: set[str] = {target}
+    while more := {name for name, calls in functions if calls & found} - found:
+        found |= more
+    return found
+
+
+def sections(docstring: str) -> list[str]:
+    """Headings of the sections of a numpydoc docstring, each underlined along its length."""
+    lines = inspect.cleandoc(docstring).splitlines()
+    return [line for line, below in zip(lines, lines[1:]) if line and below == "-" * len(line)]
+
+
+REACHING = {"Raises": reaching("raise"), "Warns": reaching("doubt")}
+ORDER = ["Parameters", "Attributes", "Returns", "Raises", "Warns", "Examples"]
+
+
 @pytest.mark.parametrize("name", FUNCTIONS)
-def test_every_public_function_has_an_example(name):
-    assert re.search(r"^Examples\n-{8}\n(.+\n)*\n*>>> ", inspect.cleandoc(FUNCTIONS[name].__doc__), re.MULTILINE), name
+def test_every_section_of_a_public_function_is_there(name):
+    function = FUNCTIONS[name]
+    calls = called(ast.parse(textwrap.dedent(inspect.getsource(function))))
+    returns = inspect.signature(function).return_annotation not in ("None", None)
+    wanted = (
+        {"Examples"} | ({"Returns"} if returns else set()) | {heading for heading, names in REACHING.items() if calls & names}
+    )
+    found = sections(function.__doc__)
+    assert wanted <= set(found) and found == sorted(found, key=ORDER.index), (name, wanted, found)
+    assert re.search(r"^Examples\n-{8}\n(.+\n)*\n*>>> ", inspect.cleandoc(function.__doc__), re.MULTILINE), name
 
 
 def run_examples(tests):

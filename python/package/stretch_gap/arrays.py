@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from . import _stretch
 from ._stretch import StretchError
 
-Array = NDArray[np.float64]
 LISTED = 4
 """Largest number of names that a note lists. Further names are only counted."""
 PER_SECOND = {"ms": 1e3, "us": 1e6, "ns": 1e9}

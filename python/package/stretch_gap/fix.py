@@ -218,8 +218,13 @@ class Fix:
         Raises
         ------
         StretchError
-            If the fix cannot be run, because the diagnosis was read from text or has the verdict `"unknown"` or `"record"`, or if
-            the recordings are wrong.
+            If the fix cannot be run, because the diagnosis was read from text or has the verdict `"unknown"` or `"record"`. If
+            the recordings are wrong. If the simulator takes neither `inputs` nor `first` nor `trials` and has no method `begin`.
+
+        Warns
+        -----
+        DoubtWarning
+            If samples count as lost, or if the time stamps seem to be in milliseconds.
 
         Examples
         --------
@@ -230,9 +235,8 @@ class Fix:
         >>> round(predicted.times_noise)
         1
         """
-        again = self._runnable()
+        again, recorded = self._recorded(data, rate_hz)
         fitted, begins_s = again.fixed.fitted
-        recorded = entries.recorded(data, rate_hz, again.fixed.columns)
         later = [(columns, begins_s + start_s, True) for columns, start_s, _ in recorded]
         checked = again.fixed.problem(later, False)
         session = json.loads(checked.session)
@@ -269,8 +273,13 @@ class Fix:
         Raises
         ------
         StretchError
-            If the fix cannot be run, because the diagnosis was read from text or has the verdict `"unknown"` or `"record"`, or if
-            the recordings are wrong.
+            If the fix cannot be run, because the diagnosis was read from text or has the verdict `"unknown"` or `"record"`. If
+            the recordings are wrong. If the simulator takes neither `inputs` nor `first` nor `trials` and has no method `begin`.
+
+        Warns
+        -----
+        DoubtWarning
+            If samples count as lost, or if the time stamps seem to be in milliseconds.
 
         Examples
         --------
@@ -282,10 +291,19 @@ class Fix:
         """
         from .diagnosis import run
 
-        again = self._runnable()
-        others = [] if data is None else entries.recorded(data, rate_hz, again.fixed.columns)
+        again, others = (self._runnable(), []) if data is None else self._recorded(data, rate_hz)
         problem = again.fixed.problem(others, data is not None)
-        return run(problem, again.asked, again.how, progress, [], off=again.off, earlier=self)
+        return run(problem, json.loads(problem.session), again.asked, again.how, progress, [], off=again.off, earlier=self)
+
+    def _recorded(self, data: entries.Data, rate_hz: float | None) -> tuple[Again, list[tuple[dict[str, Any], float, bool]]]:
+        """Return new recordings, if the simulator can be driven by them."""
+        again = self._runnable()
+        if again.asked and again.asked.optional <= {"stage"} and not hasattr(again.asked.simulator, "begin"):
+            raise StretchError(
+                "the simulator does not take the argument inputs, so it can only repeat the recordings that were fitted; let it "
+                "take the columns of a recording, as in simulate(params, effects, inputs), and diagnose again"
+            )
+        return again, entries.recorded(data, rate_hz, again.fixed.columns)
 
     def _runnable(self) -> Again:
         if self._again is None:
@@ -328,15 +346,9 @@ class Prediction:
 
     def __init__(self, text: str, sentence: str, curves: Mapping[str, Sequence[Array]], dt_s: float) -> None:
         self._answer: dict[str, Any] = json.loads(text)
-        self.sentence = sentence if self._answer["effects"] else self._without_effects()
+        self.sentence = sentence
         self._curves = curves
         self._dt_s = dt_s
-
-    def _without_effects(self) -> str:
-        return (
-            "the fix has no effect, so only the re-tuned parameters were tested: the largest error of the simulator is "
-            f"{self.times_noise:.1f} times the noise"
-        )
 
     @property
     def ratio(self) -> float:

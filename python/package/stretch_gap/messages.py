@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from .arrays import Array, Arrays, library, listed
+from .arrays import Arrays, library, listed
+from .recordings import Array
 
 LONGEST = 64
 """Length of the longest array whose numbers become columns. Images and scans are longer."""

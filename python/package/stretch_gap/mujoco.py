@@ -46,19 +46,17 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from . import problem as entries
 from ._stretch import StretchError
 from .joints import Joint, found, require_commands, trials
 from .model_values import DOF, GAIN, RATE_GAIN, UNITS, apply, parts, read, write
+from .recordings import Array
 
 if TYPE_CHECKING:
     from .diagnosis import Diagnosis
 
 __all__ = ["Problem", "Simulator", "apply", "problem"]
-
-Array = NDArray[np.float64]
 
 TOLERANCES = {GAIN: 0.2, RATE_GAIN: 0.5, "damping": 0.5, "armature": 0.5, "frictionloss": 0.5}
 """Tolerances of the values of a model, one standard deviation, as a share of the value."""
@@ -92,6 +90,12 @@ class Simulator:
         Largest number of models per call.
     columns : dict of str to ndarray of shape (samples,), optional
         Columns of the recordings end to end. `begin` sets them.
+
+    Examples
+    --------
+    >>> simulator = stretch_gap.mujoco.problem(model, recording).simulator
+    >>> [joint.actuator for joint in simulator.joints], simulator.batch
+    (['motor'], 32)
     """
 
     model: Any
@@ -132,6 +136,11 @@ class Simulator:
         mujoco.MjModel
             The changed copy.
 
+        Raises
+        ------
+        KeyError
+            If a name is not that of a value of a joint or an actuator of the model.
+
         Examples
         --------
         >>> varied = problem.simulator.varied({"elbow_damping": 0.5})
@@ -164,6 +173,11 @@ class Simulator:
         -------
         dict of str to ndarray of shape (n, samples)
             Positions by column, in the unit of the column. NaN for a model that diverges.
+
+        Raises
+        ------
+        StretchError
+            If mujoco is not installed.
 
         Examples
         --------
@@ -231,6 +245,12 @@ class Problem:
         Values that the model lacks, with ranges, such as `elbow_frictionloss`.
     notes : list of str
         Joints that are not diagnosed, with the reasons.
+
+    Examples
+    --------
+    >>> problem = stretch_gap.mujoco.problem(model, recording)
+    >>> problem.effects["elbow_frictionloss"].unit
+    'N m'
     """
 
     spec: Any
@@ -259,6 +279,11 @@ class Problem:
         ------
         StretchError
             If an argument or a recording is wrong.
+
+        Warns
+        -----
+        DoubtWarning
+            As `stretch_gap.diagnose`.
 
         Examples
         --------
@@ -315,6 +340,11 @@ def problem(
         cannot be diagnosed: a joint in `joints` that never moved, a command that is constant or equal to the measurement,
         columns that can only be in degrees although neither their names nor `degrees` say so, a joint without a position
         actuator, or a ball or free joint.
+
+    Warns
+    -----
+    DoubtWarning
+        If samples of a file count as lost, or if the time stamps seem to be in milliseconds.
 
     Examples
     --------

@@ -19,8 +19,9 @@ import numpy as np
 
 from . import _stretch, matlab, messages, tables
 from ._stretch import StretchError
-from .arrays import Array, Arrays
+from .arrays import Arrays
 from .frames import frame
+from .recordings import Array
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 READERS: tuple[tuple[int, bytes, Callable[[Path, Arrays], None]], ...] = (

@@ -6,12 +6,11 @@ import os
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ._stretch import StretchError
 from .outputs import replaceable
+from .recordings import Array
 
-Array = NDArray[np.float64]
 CURVES = ("measured", "as_shipped", "retuned", "with_effects")
 
 

@@ -68,6 +68,35 @@ def test_no_gap_is_left(found):
         assert again.named == [] and again.verdict in verdicts, again.sentence
 
 
+def test_new_recordings_of_any_length_are_predicted_as_a_call_computes_them(found):
+    fix = found.fix()
+    new = [recording(0.9 * FORCE[500:2000].copy(), 5), recording(FORCE[1000:3500].copy(), 6)]
+    predicted = fix.predict(new, rate_hz=RATE_HZ)
+    curves = predicted.curves()
+    for name, simulator in [("with_effects", fix), ("measured", lambda *_, inputs, first: inputs["angle_deg"])]:
+        called = np.concatenate([simulator({}, {}, inputs=one, first=begun(one)) for one in new])
+        np.testing.assert_allclose(curves[name], called, rtol=1e-9, atol=1e-9)
+    starts = (0, 1500, 4000)
+    for one, start, end in zip(predicted.outputs, starts[:-1], starts[1:], strict=True):
+        errors = [np.sqrt(np.mean((curves["measured"] - curves[name])[start:end] ** 2)) for name in ("with_effects", "without")]
+        np.testing.assert_allclose([one["rmse"], one["rmse_without"]], errors)
+        np.testing.assert_allclose([one["times_noise"], one["ratio"]], errors[0] / np.array([one["noise"], errors[1]]))
+    assert [one["trial"] for one in predicted.outputs] == ["recording 1", "recording 2"]
+    assert predicted.ratio == pytest.approx(np.prod([one["ratio"] for one in predicted.outputs]) ** 0.5) and predicted.ratio < 0.2
+    assert predicted.times_noise == max(one["times_noise"] for one in predicted.outputs) < 1.3
+    html = predicted._repr_html_()
+    assert html.count("<tr>") == 3 and predicted.sentence in html and "recording 2" in html
+
+
+def test_a_simulator_that_takes_no_recording_cannot_predict_another_one():
+    found = diagnose(Spring(), BENT)
+    for run in (found.fix().predict, found.fix().diagnose):
+        with pytest.raises(
+            stretch_gap.StretchError, match="the simulator does not take the argument inputs, so it can only repeat"
+        ):
+            run({"force_N": FORCE, "length_mm": FORCE}, rate_hz=RATE_HZ)
+
+
 def test_a_wrong_call_says_what_to_do(found):
     fix = found.fix()
     for given, words in [
@@ -141,6 +170,10 @@ def test_recordings_end_to_end_and_several_outputs():
     for output in ("angle_deg", "seen_V"):
         fixed, curve = (one.curves(output)[name] for one, name in [(again, "as_shipped"), (found, "with_effects")])
         np.testing.assert_allclose(fixed, curve, rtol=1e-9, atol=1e-9)
+    moved = recording(0.9 * FORCE[:2000], 8)
+    predicted = found.fix().predict({**moved, "seen_V": 0.5 * late(moved["angle_deg"]) + noise(2000, 9)}, rate_hz=RATE_HZ)
+    assert [(one["stage"], one["column"]) for one in predicted.outputs] == [("servo", "angle_deg"), ("eye", "seen_V")]
+    assert predicted.times_noise < 1.5 and predicted.curves("seen_V")["with_effects"].shape == (2000,)
 
 
 def test_an_effect_at_a_column_of_several_stages_is_not_applied():
@@ -196,14 +229,16 @@ def test_a_column_that_the_simulator_misses_is_named():
         found.fix()(inputs={"force": FORCE})
 
 
-def test_a_fix_without_an_effect_is_predicted_in_a_sentence():
+@pytest.mark.parametrize("compliance, verdict", [((2.0, 0.2), "parameters"), ((2.1, 0.2), "no_gap"), (2.1, "no_gap")])
+def test_a_fix_without_an_effect_is_predicted_in_a_sentence(compliance, verdict):
     def spring(params, effects, inputs):
         return params["compliance"] * inputs["force_N"]
 
-    found = diagnose(spring, 2.1 * FORCE + noise(FORCE.size), effects=None)
-    assert found.verdict == "parameters"
+    found = diagnose(spring, 2.1 * FORCE + noise(FORCE.size), effects=None, parameters={"compliance": compliance})
+    assert found.verdict == verdict, found.sentence
     predicted = found.fix().predict({"force_N": FORCE, "length_mm": 2.1 * FORCE + noise(FORCE.size, 1)}, rate_hz=RATE_HZ)
     assert predicted.sentence.startswith("the fix has no effect, so only the re-tuned parameters were tested: the largest error")
+    assert predicted.notes == [] and predicted.ratio == 1.0 and predicted.times_noise < 1.2
 
 
 def test_a_fix_that_cannot_be_run_says_the_reason():

@@ -99,6 +99,13 @@ impl Prediction {
 
     /// The result in a sentence.
     pub fn sentence(&self) -> String {
+        if self.effects.is_empty() {
+            return format!(
+                "the fix has no effect, so only the re-tuned parameters were tested: the largest error of the simulator is {:.1} \
+                 times the noise",
+                self.largest_times_noise
+            );
+        }
         let better = self.outputs().filter(|o| o.ratio < 1.0).count();
         format!(
             "with {} the simulator predicts {better} of {} outputs better than without (with re-tuned parameters): the ratio of the \
@@ -178,7 +185,7 @@ pub fn predict_with(
     let (with, without) = (Checked::new(spec)?, Checked::new(bare)?);
     let mut in_front = with.standing.iter().filter(|(at, _)| with.is_in_front(*at));
     if let Some((at, _)) = in_front.next().filter(|_| !source.takes_inputs()) {
-        let hint = "let it take them (inputs = true in its hello)";
+        let hint = "let it take them (a function or a method: an argument inputs; a worker in another language: inputs = true in its hello)";
         let found = "the simulator takes no altered inputs";
         return Err(ProblemError::value(&with.wrappers[*at].name, found, hint));
     }
@@ -197,8 +204,9 @@ pub fn predict_with(
         return Err(ProblemError::too_little("no new recording is long enough", hint));
     }
     let mut notes: Vec<String> = with.notes().iter().cloned().chain(source.notes()).collect();
-    if !is_tuned {
-        notes.push("the file has no parameter values that were re-tuned without the effects (alone), so the values of the fix are used; this makes the simulator without the fix look worse than it is".into());
+    let has_free = with.description().parameters.iter().any(|p| p.sd > 0.0);
+    if has_free && !is_tuned && !effects.is_empty() {
+        notes.push("the fix has no parameter values that were re-tuned without the effects (alone), so its values are used; this makes the simulator without the fix look worse than it is".into());
     }
     let all = || trials.iter().flat_map(|t| &t.outputs);
     let ratio = (all().map(|o| o.ratio.ln()).sum::<f64>() / all().count() as f64).exp();

@@ -32,10 +32,14 @@ fn recorded(number: u64, far: f64, quick: f64) -> SessionTrial {
 }
 
 fn predicted(new: &[(f64, f64)], play: f64) -> Prediction {
+    predicted_with(new, play, |_| ())
+}
+
+fn predicted_with(new: &[(f64, f64)], play: f64, change: impl Fn(&mut ProblemSpec)) -> Prediction {
     let mut trials = vec![recorded(0, 10.0, 1.0), recorded(1, 10.0, 1.0)];
     let numbered = new.iter().zip(2..);
     trials.extend(numbered.map(|((far, quick), n)| recorded(n, *far, *quick)));
-    let spec = ProblemSpec {
+    let mut spec = ProblemSpec {
         stages: vec![StageEntry {
             name: "gear".into(),
             output: "gear_deg".into(),
@@ -57,6 +61,7 @@ fn predicted(new: &[(f64, f64)], play: f64) -> Prediction {
         trials,
         ..ProblemSpec::default()
     };
+    change(&mut spec);
     // The measured shaft drives the gear, so the closure holds the recorded shaft.
     let shafts: Vec<f64> =
         spec.trials.iter().flat_map(|t| t.trial.channels[1].values.iter().copied()).collect();
@@ -99,4 +104,21 @@ fn columns_and_rates_outside_the_fitted_ranges_are_listed() {
     assert!(has(1, "shaft_deg is ") && has(1, "gear_deg is "), "{:?}", of(1));
     assert!(has(2, "the rate of shaft_deg is "), "{:?}", of(2));
     assert!(of(2).iter().all(|s| s.starts_with("the rate of ")), "{:?}", of(2));
+}
+
+/// Without re-tuned values of their own the errors without the fix are too large. A fix without effects, and exact
+/// parameters, need no such values.
+#[test]
+fn parameters_that_were_not_re_tuned_are_noted() {
+    let notes = |change: &dyn Fn(&mut ProblemSpec)| {
+        let found = predicted_with(&[(9.5, 1.0)], 0.4, |spec| {
+            spec.parameters[0].alone = None;
+            change(spec);
+        });
+        (found.sentence(), found.notes.iter().any(|note| note.contains("(alone)")))
+    };
+    assert!(notes(&|_| ()).1);
+    assert!(!notes(&|spec| spec.parameters[0].tolerance = Tolerance::Exact).1);
+    let (sentence, is_noted) = notes(&|spec| spec.wrapped.clear());
+    assert!(!is_noted && sentence.starts_with("the fix has no effect"), "{sentence}");
 }

@@ -23,6 +23,8 @@ pub(crate) enum Lack {
     Product,
     /// 0.02 V lag(v^2, 2 s).
     Warming,
+    /// 1 V (x - lag(x, 60 s)), slower than a trial is long.
+    Settling,
     /// Random switching between two levels.
     Telegraph,
     /// A step at a different time in each trial.
@@ -159,6 +161,10 @@ fn extra(lack: Lack, x: &[f64], random: &mut RandomGenerator) -> Vec<f64> {
         Lack::Warming => {
             held += if i == 0 { -held } else { DT_S * (rate(i).powi(2) - held) / 2.0 };
             0.02 * held
+        }
+        Lack::Settling => {
+            held += DT_S * (x[i] - held) / 60.0;
+            x[i] - held
         }
         Lack::Telegraph => {
             if random.unit() < DT_S / 1.5 {

@@ -44,6 +44,18 @@ fn planted_warming_is_found_again() {
     assert_relative_eq!(first.coefficient, expected, epsilon = 0.0, max_relative = PLANTED_TERM);
 }
 
+/// The lag is slower than a trial of 40 s is long, of which 28 s are fitted.
+#[test]
+fn no_time_constant_is_longer_than_the_recording() {
+    let found = proposed(&Gauge::lacking(Lack::Settling, 0));
+    let [Factor::Lag { tau_s, .. }] = found.terms[0].form.factors[..] else {
+        panic!("{}", found.equation)
+    };
+    assert!(tau_s > 28.0 && tau_s <= 40.0, "{}", found.equation);
+    let words = "s is longer than the 28.0 s that were fitted of the longest recording, so the cause may also be a drift or an integral.";
+    assert!(found.sentence.contains(words), "{}", found.sentence);
+}
+
 #[test]
 fn what_switches_jumps_or_wanders_on_its_own_is_random_in_time() {
     for lack in [Lack::White, Lack::Telegraph, Lack::Jumps, Lack::SlowDrift] {

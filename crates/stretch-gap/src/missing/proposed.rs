@@ -239,10 +239,27 @@ pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
             "What is left in {stage} depends on the recorded signals, but no short sum of terms describes how."
         ),
         (false, false) => format!(
-            "What is missing in {stage} may be {equation}: it closes {:.0} % of what is left there on trials that were not fitted.",
-            100.0 * closes_test
+            "What is missing in {stage} may be {equation}: it closes {:.0} % of what is left there on trials that were not fitted.{}",
+            100.0 * closes_test,
+            slow(proposed)
         ),
     }
+}
+
+/// Says that a time constant is too long to be determined; empty if all are shorter than the longest
+/// fitted part of a recording.
+fn slow(proposed: &Proposed) -> String {
+    let longest_s = proposed.terms.iter().map(|t| t.form.longest_s()).fold(0.0, f64::max);
+    let fitted_s = proposed.time_scales_s[0];
+    if longest_s <= fitted_s {
+        return String::new();
+    }
+    format!(
+        " The time constant of {} s is longer than the {} s that were fitted of the longest recording, so the cause may also be a drift or \
+         an integral.",
+        three_digits(longest_s),
+        three_digits(fitted_s)
+    )
 }
 
 /// Formats a number with three significant digits.

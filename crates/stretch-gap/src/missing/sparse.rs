@@ -46,7 +46,7 @@ const SCREENED: usize = 8000;
 const NEW: f64 = 1e-4;
 /// First and last step of the refinement of a shape, as factors.
 const STEPS: (f64, f64) = (1.6, 1.05);
-/// Plausible values of any shape.
+/// Plausible values of a shape. A time constant is also no longer than the recording.
 const REACH: std::ops::Range<f64> = 1e-3..1e4;
 /// Smallest ratio of held-out to fitted samples. Below it, further samples are held out for the
 /// choice of terms.
@@ -245,6 +245,10 @@ impl Pursuit<'_, '_> {
         let of = |term: &Term| {
             gain(&means(self.roles, Role::Fit, &self.residue.values(term), self.count))
         };
+        let is_plausible = |term: &Term, shape: usize| {
+            REACH.contains(&term.shapes()[shape])
+                && term.longest_s() <= self.residue.inputs.recorded_s
+        };
         let mut most = of(&term);
         for shape in 0..term.shapes().len() {
             let mut step = STEPS.0;
@@ -255,7 +259,7 @@ impl Pursuit<'_, '_> {
                     (of(&term), term)
                 });
                 match tried.into_iter().find(|(gain, _)| *gain > most) {
-                    Some((better, found)) if REACH.contains(&found.shapes()[shape]) => {
+                    Some((better, found)) if is_plausible(&found, shape) => {
                         (most, term) = (better, found);
                     }
                     _ => step = step.sqrt(),

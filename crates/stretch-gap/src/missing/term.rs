@@ -133,38 +133,46 @@ impl Term {
     /// Returns the shapes (widths, times, knees) that may be refined.
     pub(crate) fn shapes(&self) -> Vec<f64> {
         let mut copy = self.clone();
-        copy.shapes_mut().into_iter().map(|x| *x).collect()
+        copy.shapes_mut().into_iter().map(|(x, _)| *x).collect()
+    }
+
+    /// Returns the longest time constant or delay of the term, s; 0 if it has none.
+    pub(crate) fn longest_s(&self) -> f64 {
+        let mut copy = self.clone();
+        let times = copy.shapes_mut().into_iter().filter(|(_, is_time)| *is_time);
+        times.fold(0.0, |longest, (x, _)| longest.max(*x))
     }
 
     /// Returns the term with another value for one shape; an index beyond the last shape changes
     /// nothing.
     pub(crate) fn with_shape(&self, index: usize, value: f64) -> Self {
         let mut copy = self.clone();
-        if let Some(shape) = copy.shapes_mut().into_iter().nth(index) {
+        if let Some((shape, _)) = copy.shapes_mut().into_iter().nth(index) {
             *shape = value;
         }
         copy
     }
 
-    fn shapes_mut(&mut self) -> Vec<&mut f64> {
+    /// Returns each shape, and whether it is a time in s.
+    fn shapes_mut(&mut self) -> Vec<(&mut f64, bool)> {
         let factors = self.factors.iter_mut().filter_map(|f| match f {
             Factor::Centred { at, .. } | Factor::Above { at, .. } | Factor::Below { at, .. } => {
-                Some(at)
+                Some((at, false))
             }
             Factor::Low { width, .. }
             | Factor::High { width, .. }
             | Factor::Play { width, .. }
             | Factor::Turned { width, .. }
-            | Factor::TravelFade { width, .. } => Some(width),
-            Factor::Sine { turns, .. } | Factor::Cosine { turns, .. } => Some(turns),
-            Factor::Lag { tau_s, .. } | Factor::TimeFade { tau_s } => Some(tau_s),
-            Factor::Late { delay_s, .. } => Some(delay_s),
+            | Factor::TravelFade { width, .. } => Some((width, false)),
+            Factor::Sine { turns, .. } | Factor::Cosine { turns, .. } => Some((turns, false)),
+            Factor::Lag { tau_s, .. } | Factor::TimeFade { tau_s } => Some((tau_s, true)),
+            Factor::Late { delay_s, .. } => Some((delay_s, true)),
             _ => None,
         });
         let passage = match &mut self.passage {
             Passage::Direct => None,
             Passage::Lag { tau_s } | Passage::Rest { tau_s } | Passage::Leak { tau_s } => {
-                Some(tau_s)
+                Some((tau_s, true))
             }
         };
         factors.chain(passage).collect()

@@ -60,6 +60,8 @@ pub(crate) struct TermInputs {
     /// are units of time for terms.
     pub(crate) trial_s: f64,
     pub(crate) session_s: f64,
+    /// Length of the longest trial without its test samples, s.
+    pub(crate) recorded_s: f64,
     /// Time grid on which operators (lags, plays) are stepped: one step per sample.
     pub(crate) grid: Grid,
 }
@@ -94,6 +96,8 @@ impl TermInputs {
             starts_s: trials.iter().map(|t| t.start_s - first_s).collect(),
             trial_s: longest as f64 * dt_s,
             session_s: fitted().map(end_s).fold(dt_s, f64::max),
+            recorded_s: SampleRoles::not_tested(trials).into_iter().max().unwrap_or(0) as f64
+                * dt_s,
             trials: ranges,
             grid,
         };

@@ -128,7 +128,7 @@ impl SampleRoles {
         let Some(last) = fitted.map(|s| s.trial).max() else {
             return Err(GapError::TooLittle {
                 what: "no trial may be fitted".into(),
-                hint: "give at least one trial split = \"fit\"".into(),
+                hint: "give at least one trial that is not a test trial".into(),
             });
         };
         let block = ((block_s / dt_s).round() as usize).max(1);

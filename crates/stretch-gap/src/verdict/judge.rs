@@ -6,8 +6,8 @@
 //! | a cause outside the catalogue is the most probable, or the most probable set predicts test trials no better than no effect | `unknown` |
 //! | effects are the most probable, the gap is relevant, and only noise and model discrepancy are left | `effect` |
 //! | the same, but more is left, or the strongest effect is at an end of its range | `partial` |
-//! | that nothing is missing is the most probable, or the gap is too small to matter; there is a relevant gap as shipped | `parameters` |
-//! | the same, but there is no relevant gap as shipped | `no_gap` |
+//! | that nothing is missing is the most probable, or the gap is too small to matter; there is a relevant gap as shipped, and re-tuning reduces it | `parameters` |
+//! | the same, but there is no relevant gap as shipped, or nothing can be re-tuned | `no_gap` |
 //!
 //! A gap is relevant from `least_gap` on. Noise and discrepancy leave at most [`allowed`]. Two
 //! checks override the posterior with `unknown`, because no likelihood is available for them:
@@ -129,7 +129,7 @@ fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
         } else {
             VerdictKind::Partial
         }
-    } else if raw > thresholds.least_gap {
+    } else if raw > thresholds.least_gap && retuned < raw {
         VerdictKind::Parameters
     } else {
         VerdictKind::NoGap
@@ -223,6 +223,8 @@ mod tests {
             ([20.0, 10.0, 10.0], [0.0, 0.1, 0.9], Unknown),
             ([20.0, 0.04, 0.01], [0.9, 0.1, 0.0], Parameters),
             ([20.0, 0.05, 0.05], [0.1, 0.8, 0.1], Parameters),
+            // without a free parameter nothing can be re-tuned
+            ([0.15, 0.15, 0.15], [0.1, 0.8, 0.1], NoGap),
             ([0.04, 0.04, 0.04], [0.1, 0.8, 0.1], NoGap),
         ] {
             let verdict = judged(gap, probabilities, |_| ());

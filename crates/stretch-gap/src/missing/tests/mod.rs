@@ -37,6 +37,7 @@ fn inputs(signals: Vec<Signal>, samples: &[usize]) -> TermInputs {
         starts_s: (0..trials.len()).map(|i| 60.0 * i as f64).collect(),
         trial_s: DT_S * samples[0] as f64,
         session_s: 60.0 * trials.len() as f64,
+        recorded_s: DT_S * samples[0] as f64,
         trials,
         grid: Grid::samples(DT_S).expect("a grid"),
     }

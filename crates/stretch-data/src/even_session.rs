@@ -200,7 +200,7 @@ impl EvenSession {
             return order;
         }
         self.notes.push(
-            "start_s does not rise from trial to trial: the order of the file and pauses of 15 s are assumed"
+            "start_s does not rise from trial to trial: the given order and pauses of 15 s are assumed"
                 .into(),
         );
         let mut at_s = 0.0;

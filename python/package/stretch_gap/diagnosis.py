@@ -10,8 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-import numpy as np
-
 from . import _stretch, figures, html, timeline
 from . import problem as entries
 from ._stretch import Refused, StretchError
@@ -245,8 +243,8 @@ class Diagnosis:
 
         The experiment is searched only if `diagnose` is called with `experiment=True`. The dict holds among others `name`,
         `why` (a sentence that describes the experiment), `minutes` (its duration), `separates` (the effects that it
-        distinguishes), `columns` (a dict of arrays with the commands and `time_s`) and `notes` (sentences on commands that are
-        much faster than the recorded ones, or that begin with a jump).
+        distinguishes) and `columns` (a dict of arrays with the commands and `time_s`). The commands begin at the first recorded
+        values and are no faster than the recorded ones.
         """
         found = self._answer.get("next_experiment")
         return {**found, "columns": dict(self._experiment or {})} if found else None
@@ -309,9 +307,7 @@ class Diagnosis:
         >>> bool(np.std(curves["measured"] - curves["with_effects"]) < 0.02)
         True
         """
-        if not self._curves:
-            raise StretchError("this diagnosis was read from text, which contains no curves; diagnose again")
-        four = self._curves[figures.output_of(self._curves, output)]
+        four = self._held(self._curves, "curves")[figures.output_of(self._curves, output)]
         return dict(zip(("measured", "as_shipped", "retuned", "with_effects"), four))
 
     def plot(self, output: str | None = None) -> Any:
@@ -340,6 +336,12 @@ class Diagnosis:
         """
         values = self.curves(output)
         return figures.draw(values, self._session["dt_s"], figures.output_of(self._curves, output), self.sentence)
+
+    def _held(self, value: Any, what: str) -> Any:
+        """Return a value that a diagnosis from text does not have."""
+        if not value:
+            raise StretchError(f"this diagnosis was read from text, which contains no {what}; diagnose again")
+        return value
 
     def fix(self) -> Fix:
         """Return the changes that the simulator needs.
@@ -424,8 +426,7 @@ class Diagnosis:
         >>> with tempfile.TemporaryDirectory() as folder:
         ...     found.to_rerun(f"{folder}/why.rrd")
         """
-        if not self._curves or not self._session:
-            raise StretchError("this diagnosis was read from text, which contains no curves; diagnose again")
+        self._held(self._curves, "curves")
         spans = [(trial["name"], trial["samples"], trial["start_s"]) for trial in self._session["trials"]]
         timeline.write(path, self._curves, spans, self._session["dt_s"], self.sentence)
 
@@ -501,8 +502,7 @@ class Diagnosis:
         >>> page[:15]
         '<!DOCTYPE html>'
         """
-        if not self._page:
-            raise StretchError("this diagnosis was read from text, which contains no report; diagnose again")
+        self._held(self._page, "report")
         if path is not None:
             with open(replaceable(path, ".html"), "w", encoding="utf-8") as file:
                 file.write(self._page)
@@ -739,7 +739,8 @@ def diagnose(
         "takes_inputs": asked is None or asked.takes_inputs,
         "experiment": experiment,
     }
-    return run(checked, asked, how, progress, notes, off=dict(zip(json.loads(checked.session)["effects"], off)))
+    session = json.loads(checked.session)
+    return run(checked, session, asked, how, progress, notes, off=dict(zip(session["effects"], off)))
 
 
 EFFECTS = '{"friction": (0.0, 5.0)}, with the least and the greatest value; effects around the simulator belong in wrap'
@@ -777,6 +778,7 @@ def _inputs(stages: Sequence[entries.Stage], units: Mapping[str, str], noise: Ma
 
 def run(
     checked: _stretch.Problem,
+    session: dict[str, Any],
     asked: Asked | None,
     how: dict[str, Any],
     progress: Callable[[str], Any] | None,
@@ -785,11 +787,10 @@ def run(
     off: dict[str, float],
     earlier: Fix | None = None,
 ) -> Diagnosis:
-    """Diagnose a checked problem. `notes` precede the notes of the diagnosis.
+    """Diagnose a checked problem with its parsed session. `notes` precede the notes of the diagnosis.
 
     For `off` see `Again`. `earlier` is the fix that is in the problem.
     """
-    session = json.loads(checked.session)
     if asked is not None:
         asked.bind({**session, "columns": checked.columns})
     with figures.shown(progress, asked, how["budget"]) as report:
@@ -804,42 +805,8 @@ def run(
             ) from asked.refusal
     answer = json.loads(text)
     answer["notes"] = notes + answer["notes"]
-    if trial is not None and answer.get("next_experiment"):
-        answer["next_experiment"]["notes"] = _fast(trial, checked.columns, session)
-        answer["notes"] += answer["next_experiment"]["notes"]
     again = None if fixed is None else Again(fixed, asked, how, session, off)
     return Diagnosis(answer, page, curves, functions, trial, session, again, earlier)
-
-
-def _fast(experiment: Mapping[str, Array], columns: Mapping[str, Array], session: Mapping[str, Any]) -> list[str]:
-    """Return notes on commands of an experiment that are much faster than the recorded ones, or that begin with a jump."""
-    notes = []
-    ends = np.cumsum([trial["samples"] for trial in session["trials"]])[:-1]
-    step_s = float(np.median(np.diff(experiment["time_s"])))
-    for name in experiment:
-        if name not in columns:
-            continue
-        trials, proposed, unit = np.split(columns[name], ends), experiment[name], _stretch.unit_of(name)
-        rate = float(np.max(np.abs(np.diff(proposed)), initial=0.0) / step_s)
-        seen = float(max(np.max(np.abs(np.diff(one)), initial=0.0) for one in trials) / session["dt_s"])
-        if rate > FAST * seen:
-            notes.append(
-                f"next experiment: {name} changes by up to {rate:.3g} {unit}/s, but only by {seen:.3g} {unit}/s in the recordings"
-                "; check that the machine can follow, or play the commands more slowly"
-            )
-        begins = min((float(one[0]) for one in trials if one.size), key=lambda x: abs(x - proposed[0]))
-        if abs(begins - proposed[0]) > JUMP * np.ptp(columns[name]):
-            notes.append(
-                f"next experiment: {name} begins at {proposed[0]:.3g} {unit}, but at {begins:.3g} {unit} in the recordings; move "
-                "there slowly before the experiment"
-            )
-    return notes
-
-
-FAST = 2.0
-"""Largest ratio of the rate of a proposed command to the rate in the recordings without a note."""
-JUMP = 0.05
-"""Largest jump at the start of a proposed command without a note, as a share of the recorded range."""
 
 
 def wrappers() -> Any:

@@ -8,18 +8,27 @@ pub(crate) type Points = Vec<(f64, f64)>;
 pub(crate) type Candidate = (&'static str, &'static str, Points);
 
 /// A course that begins at the first point and goes through the others, with zero slope at each point.
-pub(crate) fn course(points: &[(f64, f64)], dt_s: f64) -> Vec<f64> {
-    let mut out = Vec::new();
-    for pair in points.windows(2) {
+pub(crate) fn course(points: &[(f64, f64)], dt_s: f64) -> impl Iterator<Item = f64> {
+    points.windows(2).flat_map(move |pair| {
         let (from, (to, seconds)) = (pair[0].0, pair[1]);
         let samples = ((seconds / dt_s).round() as usize).max(1);
-        let way = |i: usize| i as f64 / samples as f64;
-        out.extend((0..samples).map(|i| {
-            let x = way(i);
+        (0..samples).map(move |i| {
+            let x = i as f64 / samples as f64;
             from + (to - from) * x * x * (3.0 - 2.0 * x)
-        }));
-    }
-    out
+        })
+    })
+}
+
+/// Points with more time where a change by 1 would otherwise take less than `least_s` at the greatest
+/// rate of [`course`], which is 1.5 times the mean rate between two points.
+pub(crate) fn paced(points: &[(f64, f64)], least_s: f64) -> Points {
+    let mut before = points.first().map_or(0.0, |point| point.0);
+    let slowed = |&(share, seconds): &(f64, f64)| {
+        let change = (share - before).abs();
+        before = share;
+        (share, seconds.max(1.5 * change * least_s))
+    };
+    points.iter().map(slowed).collect()
 }
 
 /// Points of `times` loops between two levels, `half_s` seconds each way.
@@ -65,4 +74,29 @@ pub(crate) fn moving() -> Vec<Candidate> {
         ("steps_with_dwells", "Quick steps, each followed by a rest.", begin(&[steps])),
         ("chirp", "Loops over the whole range, ever faster.", begin(&[chirp])),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A limit of half the range per second. The number of samples is rounded, so the rate may be up to 2 % higher.
+    #[test]
+    fn a_paced_course_goes_the_same_way_no_faster_than_its_limit() {
+        const DT_S: f64 = 0.01;
+        let fastest = |points: &[(f64, f64)]| {
+            let values: Vec<f64> = course(points, DT_S).collect();
+            let greatest = values.windows(2).map(|pair| (pair[1] - pair[0]).abs() / DT_S);
+            greatest.fold(0.0, f64::max)
+        };
+        for (name, _, points) in moving() {
+            let slowed = paced(&points, 2.0);
+            assert!(fastest(&points) > 0.55 && fastest(&slowed) < 0.51, "{name}");
+            let same =
+                |(one, other): (&(f64, f64), &(f64, f64))| one.0 == other.0 && one.1 <= other.1;
+            assert!(points.iter().zip(&slowed).all(same), "{name}");
+            // what is slow enough stays as it is
+            assert_eq!(paced(&points, 1e-3), points);
+        }
+    }
 }

@@ -44,7 +44,7 @@ impl Columns {
         let asked: Vec<&str> = names.iter().map(String::as_str).collect();
         let session = EvenSession::new(trials, &asked, shortest(trials))?;
         if !trials.is_empty() && trials.iter().all(|t| t.split == Split::Test) {
-            let hint = "give at least one trial split = \"fit\"";
+            let hint = "give at least one trial that is not a test trial";
             return Err(ProblemError::too_little("no trial may be fitted", hint));
         }
         if session.trials().is_empty() {

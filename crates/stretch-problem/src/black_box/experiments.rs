@@ -1,8 +1,9 @@
 //! Candidate experiments on a user's own simulator, and the outputs that a model predicts for each.
 //!
-//! A candidate moves one input over the range in which it was measured, for as long as the first
-//! trial lasted; the other inputs rest at their median. The simulator runs a candidate as it runs
-//! any altered input, so that every simulator that takes altered inputs predicts experiments.
+//! A candidate moves one input over the range in which it was measured, no faster than it was
+//! measured, for as long as the first trial lasted. The other inputs rest at their median. Every
+//! input begins at its first measured value. The simulator runs a candidate as it runs any altered
+//! input, so that every simulator that takes altered inputs predicts experiments.
 
 use std::{
     collections::hash_map::DefaultHasher,
@@ -13,8 +14,8 @@ use stretch_data::{Channel, Trial, ends};
 use stretch_effects::{Beside, Side};
 use stretch_gap::{GapError, Laboratory, Model, Plan, Run, Simulator};
 
-use super::{BlackBox, runs::Altered, source::SourceError};
-use crate::bench::courses::{course, moving};
+use super::{BlackBox, runs::Altered, source::SourceError, velocity::of_position};
+use crate::bench::courses::{course, moving, paced};
 
 /// Greatest number of inputs that candidates move.
 const MOVED: usize = 3;
@@ -48,17 +49,21 @@ impl Course {
     }
 }
 
-/// An external input: its name, and its range and median over the samples outside the test samples.
+/// An external input: its name, and its range, median, first value and greatest rate per second over
+/// the samples outside the test samples.
 struct Driven {
     name: String,
     range: (f64, f64),
     median: f64,
+    first: f64,
+    fastest: f64,
 }
 
 impl BlackBox {
     /// The external inputs: inputs that are not the output of any stage.
     fn driven(&self) -> Vec<Driven> {
         let session = self.problem.session();
+        let (looked, trials) = (self.problem.columns.looked_at(), self.problem.columns.ranges());
         let is_output = |name: &str| session.stages.iter().any(|s| s.output == name);
         let mut out: Vec<Driven> = Vec::new();
         for name in session.stages.iter().flat_map(|s| &s.inputs) {
@@ -66,35 +71,39 @@ impl BlackBox {
                 continue;
             }
             let column = self.problem.columns.of(name).unwrap_or(&[]);
-            let looked = self.problem.columns.looked_at();
-            let mut values: Vec<f64> =
-                looked.iter().flat_map(|r| &column[r.clone()]).copied().collect();
-            if values.is_empty() {
-                continue;
-            }
+            let all = |of: &[f64]| -> Vec<f64> {
+                looked.iter().flat_map(|r| &of[r.clone()]).copied().collect()
+            };
+            let mut values = all(column);
+            let Some(&first) = values.first() else { continue };
             let range = ends(&values);
             let middle = values.len() / 2;
             let median = *values.select_nth_unstable_by(middle, f64::total_cmp).1;
-            out.push(Driven { name: name.clone(), range, median });
+            let rates = all(&of_position(column, &trials, session.dt_s));
+            let fastest = rates.iter().fold(0.0, |a: f64, rate| a.max(rate.abs()));
+            out.push(Driven { name: name.clone(), range, median, first, fastest });
         }
         out
     }
 
-    /// A course in which one input goes through shares of its range and all others rest at their
-    /// medians.
-    fn moved(&self, all: &[Driven], moved: Option<(usize, &[f64])>) -> Course {
-        let samples = self.problem.session().samples(1);
+    /// A course in which one input goes through points and all others rest at their medians.
+    fn moved(&self, all: &[Driven], moved: Option<(usize, &[(f64, f64)])>) -> Course {
+        let (samples, dt_s) = (self.problem.session().samples(1), self.description().dt_s);
         let one = |(at, d): (usize, &Driven)| {
-            let values = match moved.filter(|(own, _)| *own == at) {
-                Some((_, shares)) => {
-                    let (low, high) = d.range;
-                    let last = shares.last().copied().unwrap_or(0.0);
-                    let share = |i| shares.get(i).copied().unwrap_or(last);
-                    (0..samples).map(|i| low + (high - low) * share(i)).collect()
-                }
-                None => vec![d.median; samples],
-            };
-            (d.name.clone(), values)
+            let (low, high) = d.range;
+            let span = high - low;
+            if d.fastest <= 0.0 {
+                return (d.name.clone(), vec![d.first; samples]);
+            }
+            let share = |x: f64| (x - low) / span;
+            let rest = [(share(d.median), 0.0)];
+            let points =
+                moved.filter(|(own, _)| *own == at).map_or(&rest[..], |(_, points)| points);
+            let points = [&[(share(d.first), 0.0)], points].concat();
+            let last = points[points.len() - 1].0;
+            let points = paced(&points, span / d.fastest);
+            let shares = course(&points, dt_s).chain(std::iter::repeat(last)).take(samples);
+            (d.name.clone(), shares.map(|x| low + span * x).collect())
         };
         Course(all.iter().enumerate().map(one).collect())
     }
@@ -172,12 +181,12 @@ impl Laboratory for BlackBox {
             return Vec::new();
         }
         let mut candidates = Vec::new();
-        for (at, d) in all.iter().enumerate().filter(|(_, d)| d.range.0 < d.range.1).take(MOVED) {
+        for (at, d) in all.iter().enumerate().filter(|(_, d)| d.fastest > 0.0).take(MOVED) {
             for (name, how, points) in moving() {
                 let whole_s: f64 = points.iter().skip(1).map(|(_, seconds)| seconds).sum();
                 let scaled: Vec<(f64, f64)> =
                     points.iter().map(|(share, s)| (*share, s * lasts_s / whole_s)).collect();
-                let setting = self.moved(&all, Some((at, &course(&scaled, dt_s))));
+                let setting = self.moved(&all, Some((at, &scaled)));
                 let (name, how) = match all.len() {
                     1 => (name.to_owned(), how.to_owned()),
                     _ => (format!("{name} of {}", d.name), format!("{how} By {}.", d.name)),

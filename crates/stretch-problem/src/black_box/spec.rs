@@ -261,7 +261,7 @@ impl TryFrom<WrittenEffect> for OwnEffect {
         };
         match arguments.iter().find(|a| a.is_log && a.range[0] <= 0.0) {
             Some(a) => Err(format!(
-                "its range begins at {}; with log = true it must begin above 0",
+                "its range begins at {}; on a logarithmic scale (log) it must begin above 0",
                 a.range[0]
             )),
             None => Ok(Self { name, arguments, stages, twins }),

@@ -25,13 +25,13 @@ pub struct Course {
 
 /// A course without pressure; `is_known` states whether blocks of known length replace the reference.
 fn held(points: &[(f64, f64)], is_known: bool, dt_s: f64) -> Course {
-    let e = course(points, dt_s);
+    let e: Vec<f64> = course(points, dt_s).collect();
     Course { pressure: vec![0.0; e.len()], e, is_known }
 }
 
 /// The gauge held in the middle while the pressure goes up and down.
 fn held_under_pressure(dt_s: f64) -> Course {
-    let pressure = course(&begin(&[loops(0.0, 1.0, 4.0, 4)]), dt_s);
+    let pressure: Vec<f64> = course(&begin(&[loops(0.0, 1.0, 4.0, 4)]), dt_s).collect();
     Course { e: vec![0.5; pressure.len()], is_known: true, pressure }
 }
 

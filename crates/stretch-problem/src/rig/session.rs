@@ -129,7 +129,7 @@ impl RigSession {
             columns.push(PRESSURE);
         }
         if trials.iter().all(|t| t.split == Split::Test) {
-            let hint = "give at least one trial split = \"fit\"";
+            let hint = "give at least one trial that is not a test trial";
             return Err(ProblemError::too_little("no trial may be fitted", hint));
         }
         let shares: Vec<f64> = trials.iter().map(excitation).collect::<Result<_, _>>()?;

@@ -244,14 +244,14 @@ fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<S
         Beside::Nothing | Beside::Itself => return None,
         Beside::Another => {
             format!(
-                "{} is not looked for at {}: name another column in the key beside",
+                "{} is not looked for at {}: name another column with beside",
                 kind.name, site.column
             )
         }
         Beside::VelocityAndLoad | Beside::PositionAndLoad => {
             rubs.filter(|_| site.is_force())?;
             format!(
-                "friction that grows with a load is not looked for at {}: name the column of the load in the key beside",
+                "friction that grows with a load is not looked for at {}: name the column of the load with beside",
                 site.column
             )
         }
@@ -268,8 +268,8 @@ fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<S
                 return None;
             }
             format!(
-                "friction is not looked for at {}: its unit does not show that it is a force or a torque; give its unit in [[input]], \
-                 and velocity or position in stage {stage}",
+                "friction is not looked for at {}: its unit does not show that it is a force or a torque; give the unit of this \
+                 input, and velocity or position in stage {stage}",
                 site.column
             )
         }

@@ -5,9 +5,12 @@ use std::path::PathBuf;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use stretch_data::{Channel, Trial};
-use stretch_recording::{Array, Clock, ReadOptions, Recording as FileRecording};
+use stretch_recording::{Array, Clock, ReadOptions, Recording as FileRecording, TimeColumn};
 
-use crate::{error::said, watched::watched};
+use crate::{
+    error::{in_python, said},
+    watched::watched,
+};
 
 /// A name, time stamps in seconds, and named channels of the same length. The Python package has
 /// checked them.
@@ -55,17 +58,17 @@ pub(crate) struct Asked {
 }
 
 impl Asked {
-    fn options(self) -> ReadOptions {
-        let options = self.columns.into_iter().fold(ReadOptions::new(), ReadOptions::require);
-        let options = options.time(self.time);
+    fn options(self) -> PyResult<ReadOptions> {
+        let time: TimeColumn = self.time.parse().map_err(said)?;
+        let options = self.columns.into_iter().fold(time.options(), ReadOptions::require);
         let options = match self.rate_hz {
             Some(rate_hz) => options.sample_rate_hz(rate_hz),
             None => options,
         };
-        match self.grid_hz {
+        Ok(match self.grid_hz {
             Some(rate_hz) => options.grid_hz(rate_hz),
             None => options,
-        }
+        })
     }
 }
 
@@ -87,10 +90,10 @@ pub(crate) fn read_file<'py>(
     path: PathBuf,
     asked: Asked,
 ) -> PyResult<(Columns<'py>, Vec<String>)> {
-    let options = asked.options();
+    let options = asked.options()?;
     let read = watched(py, move || FileRecording::read(path, &options))?;
     let FileRecording { trial, notes } = read.map_err(said)?;
-    Ok((columns(py, trial.time_s, trial.channels), notes))
+    Ok((columns(py, trial.time_s, trial.channels), notes.iter().map(|n| in_python(n)).collect()))
 }
 
 /// Reads named arrays like those of an NPZ file. Returns their columns on one clock, the columns of each clock, and
@@ -109,13 +112,14 @@ pub(crate) fn read_arrays<'py>(
         values: values.as_array().to_vec(),
     };
     let arrays = arrays.into_iter().map(array).collect();
-    let options = asked.options();
+    let options = asked.options()?;
     let read = watched(py, move || FileRecording::from_arrays(&name, arrays, notes, &options))?;
     let (FileRecording { trial, notes }, clocks) = read.map_err(said)?;
     let clocks = clocks
         .into_iter()
         .map(|Clock { name, time_s, channels }| (name, columns(py, time_s, channels)))
         .collect();
+    let notes = notes.iter().map(|n| in_python(n)).collect();
     Ok((columns(py, trial.time_s, trial.channels), clocks, notes))
 }
 

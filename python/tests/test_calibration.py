@@ -135,7 +135,10 @@ def test_bad_questions_are_refused_in_a_sentence(fitted, poly13):
         stretch_gap.Calibration.from_json('{"schema": 1}')
     with pytest.raises(stretch_gap.StretchError, match="cannot read it"):
         stretch_gap.Calibration.load("/nowhere/c.json")
-    with pytest.raises(stretch_gap.StretchError, match="needs the effects of the gauge"):
+    with pytest.raises(
+        stretch_gap.StretchError,
+        match=r"^model=diagnosed needs the effects of the gauge .* with diagnosis=, or fit model=observer$",
+    ):
         stretch_gap.calibrate(*fitted, RATE_HZ, model="diagnosed")
     assert issubclass(stretch_gap.StretchError, ValueError)
 

@@ -543,3 +543,16 @@ def test_the_command_writes_a_file_whole_or_says_why_not(tmp_path):
         refused = run(*wrong)
         assert refused.returncode == 1 and sentence in refused.stderr, refused.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == ["in.csv", "out.npz"]
+
+
+def test_messages_name_the_arguments_of_read(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(["x,y_mm", *(f"{i},{i / 8}" for i in range(60))]))
+    with pytest.raises(
+        stretch_gap.StretchError, match="which column is the time with time=COLUMN, or time=100hz if there is none"
+    ):
+        stretch_gap.read(path)
+    with pytest.raises(stretch_gap.StretchError, match="say which with time=x:s or x:ms, or rename it x_ms"):
+        stretch_gap.read(path, time="x")
+    for time, step_s in [("x:ms", 0.001), ("100hz", 0.01)]:
+        assert stretch_gap.read(path, time=time).time_s[1] == pytest.approx(step_s)

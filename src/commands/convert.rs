@@ -4,9 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use stretch_data::{Channel, Trial, tidy_time};
+use stretch_recording::parse_rate;
 
 use super::{
-    reading::{Recorded, rate, read_recording},
+    reading::{Recorded, read_recording},
     shared::{give_stdout, tell},
 };
 
@@ -38,7 +39,7 @@ pub(crate) struct Args {
     /// Resample to an even grid of this rate [default: as recorded]
     ///
     /// By default, several clocks are resampled to the fastest.
-    #[arg(long, value_name = "HZ", value_parser = rate)]
+    #[arg(long, value_name = "HZ", value_parser = parse_rate)]
     grid: Option<f64>,
     /// Shift the time so that it begins at zero
     #[arg(long)]

@@ -13,12 +13,13 @@ use indicatif::ProgressBar;
 use stretch_data::files::{FileError, Outputs};
 use stretch_gap::{Diagnosis, Options, VerdictKind};
 use stretch_problem::{ByTrial, Examined, Problem, Reading, in_words};
+use stretch_recording::TimeColumn;
 use stretch_report::{Subject, diagnosis_page};
 
 use super::{
     diagnosis_output::{print_by_trial, text, write_fix, write_snippets},
     json::Json,
-    reading::{Rows, TimeColumn, column, columns},
+    reading::{Rows, column, columns},
     shared::{detail, say, say_first, spinner, stage_text, tell},
 };
 use crate::display::{fail, is_quiet, is_verbose, warn};

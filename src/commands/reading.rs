@@ -1,13 +1,10 @@
 //! Reading of recordings: options and functions shared by the commands.
 
-use std::{
-    path::{Path, PathBuf},
-    str::FromStr,
-};
+use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use stretch_data::{DataError, DataSet, Split, Trial};
-use stretch_recording::{DateOrder, ReadOptions, Recording, RecordingError, TimeUnit, tidy_column};
+use stretch_recording::{ReadOptions, Recording, RecordingError, TimeColumn, tidy_column};
 
 use super::shared::progress;
 use crate::display::{detail, warn};
@@ -37,62 +34,6 @@ pub(crate) struct Rows {
     /// Otherwise such rows are left out with a note, up to one in five.
     #[arg(long)]
     pub(crate) strict: bool,
-}
-
-/// The source of a recording's time.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum TimeColumn {
-    Named(String, Option<TimeUnit>),
-    /// A column with dates, and the order of day and month.
-    Dated(String, DateOrder),
-    /// No column is read; samples have this rate, Hz.
-    Rate(f64),
-}
-
-impl FromStr for TimeColumn {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let number = text.to_ascii_lowercase();
-        if let Some(Ok(_)) = number.strip_suffix("hz").map(str::parse::<f64>) {
-            return rate(number.trim_end_matches("hz")).map(Self::Rate);
-        }
-        let order = |end: &str| match end {
-            "dmy" => Some(DateOrder::DayFirst),
-            "mdy" => Some(DateOrder::MonthFirst),
-            _ => None,
-        };
-        let dated = text.rsplit_once(':').and_then(|(name, end)| Some((name, order(end)?)));
-        if let Some((name, order)) = dated {
-            return Ok(Self::Dated(name.to_owned(), order));
-        }
-        let text = if text.starts_with(':') { format!("time_s{text}") } else { text.to_owned() };
-        let split =
-            text.rsplit_once(':').and_then(|(name, end)| Some((name, TimeUnit::abbreviated(end)?)));
-        Ok(match split {
-            Some((name, unit)) => Self::Named(name.to_owned(), Some(unit)),
-            None => Self::Named(text.to_owned(), None),
-        })
-    }
-}
-
-impl TimeColumn {
-    /// Returns the reading options for this source of time.
-    pub(crate) fn options(&self) -> ReadOptions {
-        let options = ReadOptions::new();
-        match self {
-            Self::Named(name, None) => options.time(name),
-            Self::Named(name, Some(unit)) => options.time(name).time_unit(*unit),
-            Self::Dated(name, order) => options.time(name).date_order(*order),
-            Self::Rate(rate_hz) => options.sample_rate_hz(*rate_hz),
-        }
-    }
-}
-
-/// Parses a sample rate, Hz.
-pub(crate) fn rate(text: &str) -> Result<f64, String> {
-    let rate_hz = text.parse::<f64>().ok().filter(|hz| (1e-3..=1e7).contains(hz));
-    rate_hz.ok_or_else(|| format!("\"{text}\" is not a rate between 1e-3 and 1e7 Hz"))
 }
 
 /// Returns the name of a column as the reader normalizes it: `Pos (mm)` becomes pos_mm.
@@ -204,22 +145,4 @@ fn read_all<T: Sync>(
     }
     bar.finish_and_clear();
     Ok(trials)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::{DateOrder, TimeColumn, TimeUnit};
-
-    #[test]
-    fn a_time_is_a_column_with_or_without_a_unit_or_a_rate() {
-        let named = |name: &str, unit| Ok(TimeColumn::Named(name.to_owned(), unit));
-        assert_eq!("t_ms".parse(), named("t_ms", None));
-        assert_eq!("stamp:us".parse(), named("stamp", Some(TimeUnit::Microseconds)));
-        assert_eq!("ros:stamp".parse(), named("ros:stamp", None));
-        let dated = TimeColumn::Dated("Datum".to_owned(), DateOrder::MonthFirst);
-        assert_eq!("Datum:mdy".parse(), Ok(dated));
-        assert_eq!("12.5Hz".parse(), Ok(TimeColumn::Rate(12.5)));
-        assert_eq!("hz".parse(), named("hz", None));
-        assert!("1e9hz".parse::<TimeColumn>().unwrap_err().contains("between 1e-3 and 1e7"));
-    }
 }

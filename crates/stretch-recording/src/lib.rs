@@ -16,6 +16,7 @@ mod room;
 mod sniff;
 mod stamps;
 mod text;
+mod time_column;
 
 pub use arrays::{Array, Clock};
 pub use error::RecordingError;
@@ -23,3 +24,4 @@ pub use names::tidy_column;
 pub use options::{DateOrder, ReadOptions, TimeUnit};
 pub use recording::Recording;
 pub use text::row_reader::{Row, RowReader};
+pub use time_column::{TimeColumn, parse_rate};

@@ -140,7 +140,8 @@ def read(
         Required columns. Only the clocks of these columns are used. A column can be named by the last part of its path if only
         one path has this ending. By default all columns and clocks are used.
     time : str, default "time_s"
-        Column or array of the time. If there is no column `time_s`, usual names for a time are recognised as well.
+        Column or array of the time. Its unit may follow, as in `"stamp:ms"`, and the order of dates, as in `"date:dmy"`. If there
+        is no column `time_s`, usual names for a time are recognised as well.
     rate_hz : float, optional
         Sample rate in Hz. It replaces a time column in the file. Required if the file has neither a time nor a rate.
     grid_hz : float, optional

@@ -251,8 +251,8 @@ pub(super) fn doubts(
     let samples = pieces.iter().map(|(_, [signal, ..])| signal.len()).sum::<usize>();
     if rate_hz < SLOW_HZ && samples >= TELLING && !options.is_table {
         said.push(format!(
-            "the trials have {rate_hz:.4} samples a second: are their times in milliseconds? If so, add --time time_s:ms, which makes the rates \
-             1000 times as high"
+            "the trials have {rate_hz:.4} samples a second: are their times in milliseconds? If so, convert them to seconds (in the program \
+             with --time time_s:ms), which makes the rates 1000 times as high"
         ));
     }
     let all = Line::of(pieces.iter()).spreads[1];

@@ -235,7 +235,7 @@ pub(crate) fn tracks(
         let [ClockArray { array, .. }] = &clocks[..] else {
             let names: Vec<&str> = clocks.iter().map(|clock| clock.array.name.as_str()).collect();
             let problem = format!(
-                "one rate is given for several time arrays ({}); name one with --time, or remove --sample-rate",
+                "one rate is given for several time arrays ({}); name one with --time, or give no rate",
                 listed(&names)
             );
             return Err(RecordingError::Format { file: file.to_owned(), format: "array", problem });

@@ -134,7 +134,7 @@ fn a_note_says_where_friction_is_not_looked_for() {
         assert!(frictions(&problem).is_empty(), "{columns:?}");
         assert_eq!(notes.len(), usize::from(!says.is_empty()), "{columns:?}: {notes:?}");
         // the words hold for a problem.toml and for the arguments in Python
-        let holds = |note: &String| note.contains(says) && !note.contains("[[");
+        let holds = |note: &&str| note.contains(says) && !note.contains("[[");
         assert!(notes.iter().all(holds), "{notes:?}");
     }
     // a stage that names its position is expected to have friction

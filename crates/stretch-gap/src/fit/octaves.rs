@@ -93,22 +93,10 @@ impl Octaves {
         self
     }
 
-    /// Returns the mean squares without possible model discrepancy. In each octave, the share
-    /// `of_closed` of the reduction from `nominal` may be discrepancy and is subtracted. The result
-    /// is not below what `next` leaves, unless `next` leaves more than this hypothesis; then
-    /// nothing is subtracted.
-    pub(crate) fn less_discrepancy(mut self, nominal: &Self, next: &Self, of_closed: f64) -> Self {
-        for ((x, nominal), next) in self.sums.iter_mut().zip(nominal.sums).zip(next.sums) {
-            let may_be_left = of_closed * (nominal - *x).max(0.0);
-            *x = (*x - may_be_left).max(next).min(*x);
-        }
+    /// Returns the mean squares if no octave holds more than noise with the assumed variance.
+    pub(crate) fn at_most_noise(mut self) -> Self {
+        self.sums.iter_mut().zip(self.counts).for_each(|(x, noise)| *x = x.min(noise));
         self
-    }
-
-    /// Returns the mean squares of noise with the assumed variance and the same number of
-    /// coefficients.
-    pub(crate) fn of_noise(&self) -> Self {
-        Self { sums: self.counts, counts: self.counts }
     }
 
     /// Returns S of the module documentation, from this hypothesis to `next`.
@@ -177,33 +165,19 @@ mod tests {
         }
     }
 
-    /// Octave by octave: if the first effect reduced the residual much, a small further reduction
-    /// may only correct the form of this effect, so it is not credited to a second effect. If the
-    /// first effect reduced nothing in an octave, every further reduction there is credited.
+    /// Octaves above the noise are reduced to it; the others stay, so the rise is never negative.
     #[test]
-    fn discrepancy_is_a_share_of_what_was_closed_in_its_octave() {
-        let of = |slow: f64, quick: f64| {
-            let mut octaves = Octaves { sums: [100.0; OCTAVES], counts: [100.0; OCTAVES] };
-            (octaves.sums[9], octaves.sums[1]) = (100.0 * slow, 100.0 * quick);
-            octaves
-        };
-        let nominal = of(401.0, 5.0);
-        let rise =
-            |base: Octaves, next: Octaves| base.less_discrepancy(&nominal, &next, 0.03).rise(&next);
-        let (base, next) = (of(9.0, 5.0), of(1.0, 1.0));
-        // Of the 392 that were closed in the slow octave, 11.8 may be left as discrepancy. Nothing
-        // was closed in the fast octave.
+    fn at_most_noise_keeps_what_is_below_it() {
+        let mut octaves = Octaves { sums: [100.0; OCTAVES], counts: [100.0; OCTAVES] };
+        (octaves.sums[9], octaves.sums[1]) = (900.0, 80.0);
+        let quiet = octaves.at_most_noise();
+        assert_eq!((quiet.sums[9], quiet.sums[1], quiet.counts), (100.0, 80.0, octaves.counts));
+        let known = 100.0 / (1.0 + 100.0 * KNOWN * KNOWN);
         approx::assert_relative_eq!(
-            rise(base, next),
-            of(1.0, 5.0).rise(&next),
+            octaves.rise(&quiet),
+            0.5 * known * 9.0_f64.ln(),
             max_relative = FIT_WELL
         );
-        assert!(rise(of(20.0, 1.0), next) > 12.0);
-        // If a further effect makes the misfit worse, this counts in full. Without a first effect
-        // there is no discrepancy.
-        assert_eq!(rise(next, base), next.rise(&base));
-        assert_eq!(rise(nominal, next), nominal.rise(&next));
-        assert_eq!(base.less_discrepancy(&nominal, &next, 0.0), base);
     }
 
     /// For a regressor without effect, chance yields chi^2/2 nats with one degree of freedom: 0.5

@@ -24,7 +24,6 @@ use crate::{
         hypothesis::Hypothesis,
         identifiability::{Identified, Information, identified},
         levenberg_marquardt::{Effort, FINE, Fitted, HELD},
-        octaves::Octaves,
         score::{LEARNT, Misfit, Observations, gap, score, shared},
         starts::Starts,
     },
@@ -356,28 +355,17 @@ impl<'a> PreparedProblem<'a> {
     }
 
     /// Returns the rise of the log-likelihood from the hypothesis `base` to `next`, nats, computed
-    /// from the [octaves](crate::fit::octaves) of their residuals. In each octave, the share
-    /// `of_closed` of what `base` closes counts as model discrepancy and does not contribute.
-    pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis, of_closed: f64) -> f64 {
-        let stages = 0..base.misfits.len();
-        stages.map(|s| self.rise_in(base, s, &next.misfits[s].octaves, of_closed)).sum()
+    /// from the [octaves](crate::fit::octaves) of their residuals.
+    pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis) -> f64 {
+        let stages = base.misfits.iter().zip(&next.misfits);
+        stages.map(|(base, next)| base.octaves.rise(&next.octaves)).sum()
     }
 
-    /// Returns the rise that [`PreparedProblem::rise`] would have in one stage if only noise were
-    /// left in this stage.
-    pub(crate) fn most_rise(&self, base: &Hypothesis, stage: usize, of_closed: f64) -> f64 {
-        self.rise_in(base, stage, &base.misfits[stage].octaves.of_noise(), of_closed)
-    }
-
-    fn rise_in(&self, base: &Hypothesis, stage: usize, next: &Octaves, of_closed: f64) -> f64 {
-        let nominal = &self.nominal.misfits[stage].octaves;
-        base.misfits[stage].octaves.less_discrepancy(nominal, next, of_closed).rise(next)
-    }
-
-    /// Returns the reduction of a fit's cost that corresponds to closing a gap, nats. A block of
-    /// the fitted samples counts as one observation.
-    pub(crate) fn gain_of(&self, gap: f64) -> f64 {
-        0.5 * self.compare.roles.blocks(Role::Fit) * gap
+    /// Returns the rise that [`PreparedProblem::rise`] would have in one stage if no more than noise
+    /// were left in this stage.
+    pub(crate) fn most_rise(&self, base: &Hypothesis, stage: usize) -> f64 {
+        let octaves = &base.misfits[stage].octaves;
+        octaves.rise(&octaves.at_most_noise())
     }
 
     /// Returns the share of the variance of a stage's noise that comes from the noise of its

@@ -17,8 +17,8 @@ pub struct Thresholds {
     /// Smallest share of the remaining gap that an effect must close.
     pub share: f64,
     /// Model discrepancy: the share of the gap closed by a set that may be left because the forms
-    /// of its effects differ from those of the rig. A further effect must close more. It applies in
-    /// each stage and in each octave of the residual's frequencies.
+    /// of its effects differ from those of the rig. A further effect that closes no more than that
+    /// in a stage must meet stricter criteria.
     pub model_discrepancy: f64,
     /// Temperature of the probabilities, nats: this difference of scores changes the ratio of two
     /// probabilities by a factor e.

@@ -17,7 +17,7 @@ use crate::{
     search::{
         acceptance::Acceptance,
         screen::{Ground, Screened},
-        sets::Sets,
+        sets::{RIVALRY, Sets},
     },
 };
 
@@ -35,9 +35,6 @@ pub(crate) const RIVALS: (usize, usize) = (6, 3);
 const PROMISE: f64 = 0.1;
 /// Smallest gain of an effect that is fitted, as a share of the best gain.
 const FAINT: f64 = 0.03;
-/// Smallest gain of an alternative, as a share of the gain of the effect that it would replace.
-/// Twins are fitted with any gain.
-pub(crate) const RIVALRY: f64 = 0.5;
 /// Largest number of times that an effect of the best set is replaced.
 const EXCHANGES: usize = 2;
 
@@ -225,7 +222,8 @@ impl<'a> Search<'a> {
             let looked = self.look(&best)?;
             let Looked { ground, screened } = &*looked;
             let kept = if round == 0 { KEPT } else { KEPT_LATER };
-            let list = self.shortlist(&best, screened, kept);
+            let deviating = self.acceptance.deviating(&best)?;
+            let list = self.shortlist((&best, &deviating), screened, kept);
             progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
             let mut next = self.first_accepted(&best, ground, &list)?;
             let is_open = self.problem.gap(&best) > self.acceptance.thresholds.null_excess;
@@ -233,7 +231,7 @@ impl<'a> Search<'a> {
                 // A screen assumes linear changes. Before a gap is left unexplained, every effect
                 // that could cause it is therefore fitted, whatever its gain in the screen.
                 progress(&format!("fitting the other candidates, round {}", round + 1));
-                let others = self.others(&best, screened, &list);
+                let others = self.others(&deviating, screened, &list);
                 let least = |effect| self.least_gain(&best, effect);
                 let others = self.sets.promising(&best, ground, others, least)?;
                 next = self.first_accepted(&best, ground, &others)?;
@@ -268,9 +266,14 @@ impl<'a> Search<'a> {
 
     /// Returns the effects that are not in the shortlist but could close a remaining gap, each with
     /// its best start.
-    fn others(&self, base: &Hypothesis, screened: &[Screened], list: &[Screened]) -> Vec<Screened> {
+    fn others(
+        &self,
+        deviating: &Hypothesis,
+        screened: &[Screened],
+        list: &[Screened],
+    ) -> Vec<Screened> {
         let is_new = |s: &&Screened| list.iter().all(|l| l.effect != s.effect);
-        let is_possible = |s: &&Screened| self.acceptance.is_possible(base, s.effect);
+        let is_possible = |s: &&Screened| self.acceptance.is_possible(deviating, s.effect);
         let one = |s: &Screened| {
             let starts = s.starts.iter().take(1).cloned().collect();
             Screened { starts, ..s.clone() }
@@ -316,9 +319,14 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the best effects of a screen, and the twins of the leading ones.
-    fn shortlist(&self, base: &Hypothesis, screened: &[Screened], kept: usize) -> Vec<Screened> {
-        let screened: Vec<&Screened> =
-            screened.iter().filter(|s| self.acceptance.is_promising(base, s)).collect();
+    fn shortlist(
+        &self,
+        (base, deviating): (&Hypothesis, &Hypothesis),
+        screened: &[Screened],
+        kept: usize,
+    ) -> Vec<Screened> {
+        let is_possible = |s: &&Screened| self.acceptance.is_possible(deviating, s.effect);
+        let screened: Vec<&Screened> = screened.iter().filter(is_possible).collect();
         let specs = self.problem.simulator().effects();
         let best = screened.first().map_or(0.0, |s| s.gain());
         let least = |effect| self.least_gain(base, effect).max(FAINT * best);
@@ -355,13 +363,14 @@ impl<'a> Search<'a> {
                 break;
             }
             let less = self.sets.without(best, effect)?;
+            let deviating = self.acceptance.deviating(&less)?;
             let looked = self.look(&less)?;
             let Looked { ground, screened: all } = &*looked;
             let own_gain = all.iter().find(|s| s.effect == effect).map_or(0.0, Screened::gain);
             let screened: Vec<&Screened> = all
                 .iter()
                 .filter(|s| !best.effects.contains(&s.effect))
-                .filter(|s| self.acceptance.is_promising(&less, s))
+                .filter(|s| self.acceptance.is_possible(&deviating, s.effect))
                 .collect();
             let catalogue = self.problem.simulator().effects();
             let twins = &catalogue[effect].twins;

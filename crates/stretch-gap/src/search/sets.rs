@@ -29,6 +29,9 @@ use crate::{
     search::screen::{Ground, Screened},
 };
 
+/// Smallest gain of an alternative, as a share of the gain of the effect that it would replace.
+/// Twins are fitted with any gain.
+pub(crate) const RIVALRY: f64 = 0.5;
 /// Number of starts of one effect that are fitted, and the smallest gain of a start as a share of
 /// the best.
 const STARTS: usize = 3;

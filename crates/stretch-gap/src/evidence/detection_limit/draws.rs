@@ -23,10 +23,7 @@ use crate::{
         random::RandomGenerator,
     },
     problem::sample_roles::Role,
-    search::{
-        acceptance::Acceptance,
-        selection::{RIVALRY, RIVALS},
-    },
+    search::{acceptance::Acceptance, selection::RIVALS, sets::RIVALRY},
 };
 
 /// Number of recordings that are drawn. They determine a probability of 0.9 with a standard

@@ -134,8 +134,14 @@ impl<'a> Search<'a> {
             progress("rivals");
             let rivals = self.rivals(&best)?;
             let first = rivals.iter().map(|(_, r)| r).max_by(|a, b| a.score.total_cmp(&b.score));
-            match first.filter(|r| exchanges < EXCHANGES && r.score > best.score) {
-                Some(first) => best = self.grow(first.clone(), progress)?,
+            let better = first.filter(|r| r.score > best.score).cloned();
+            let next = match better {
+                _ if exchanges >= EXCHANGES => None,
+                None => self.joined(&best, &rivals)?,
+                better => better,
+            };
+            match next {
+                Some(next) => best = self.grow(next, progress)?,
                 None => {
                     let best = self.sets.straightened(best)?;
                     let best = self.of_all_trials(best, &rivals)?;
@@ -144,6 +150,30 @@ impl<'a> Search<'a> {
             }
             exchanges += 1;
         }
+    }
+
+    /// Returns the set in which an alternative is added to an effect of `best` instead of replacing
+    /// it, if the set meets the acceptance criteria; the best of several.
+    fn joined(
+        &mut self,
+        best: &Hypothesis,
+        rivals: &[(usize, Hypothesis)],
+    ) -> Result<Option<Hypothesis>, GapError> {
+        let is_open = self.problem.gap(best) > self.acceptance.thresholds.null_excess;
+        if !is_open || best.effects.len() >= self.depth || self.problem.is_spent() {
+            return Ok(None);
+        }
+        let looked = self.look(best)?;
+        let mut found: Option<Hypothesis> = None;
+        for (replaced, rival) in rivals.iter().filter(|(_, r)| r.score > RIVALRY * best.score) {
+            let joined = self.sets.joined(best, &looked.ground, (*replaced, rival))?;
+            let Some(joined) = joined else { continue };
+            let is_better = found.as_ref().is_none_or(|f| joined.score > f.score);
+            if is_better && self.acceptance.is_accepted(best, &joined)? {
+                found = Some(joined);
+            }
+        }
+        Ok(found)
     }
 
     /// Returns the best set, or else its best alternative, that can be simulated over all trials,

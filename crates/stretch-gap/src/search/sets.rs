@@ -242,6 +242,66 @@ impl<'a> Sets<'a> {
         Ok(found)
     }
 
+    /// Fits a set with the effect that replaces `replaced` in one of its alternatives. The fit
+    /// starts halfway between the set and the alternative, with half of each effect. Returns `None`
+    /// if the two effects act in different stages, or if the result is no better than the best fit.
+    ///
+    /// Each of two effects that act alike may take the place of both: dry friction and backlash
+    /// widen the same loop. Small steps from either fit do not lead to the pair.
+    pub(crate) fn joined(
+        &mut self,
+        base: &Hypothesis,
+        ground: &Ground,
+        (replaced, rival): (usize, &Hypothesis),
+    ) -> Result<Option<Hypothesis>, GapError> {
+        let added = rival.effects.iter().copied().find(|e| !base.effects.contains(e));
+        let Some((added, model)) =
+            added.and_then(|e| Some((e, self.between(base, replaced, (e, rival))?)))
+        else {
+            return Ok(None);
+        };
+        let key = key(&base.effects, Some(added));
+        let Some(coarse) = unless_lost(self.extend(base, ground, added, (model, COARSE)))? else {
+            return Ok(None);
+        };
+        let Some(set) = unless_lost(self.polish(base, &coarse.set, added))? else {
+            return Ok(None);
+        };
+        if self.tried.get(&key).is_some_and(|known| known.score >= set.score) {
+            return Ok(None);
+        }
+        self.tried.insert(key, set.clone());
+        Ok(Some(set))
+    }
+
+    /// Returns the model halfway between a set and its alternative in which the effect `added`
+    /// replaces another, with half of each effect.
+    fn between(
+        &self,
+        base: &Hypothesis,
+        replaced: usize,
+        (added, rival): (usize, &Hypothesis),
+    ) -> Option<Model> {
+        let simulator = self.problem.simulator();
+        let specs = simulator.effects();
+        let touched = &specs[added].touches;
+        if !specs[replaced].touches.iter().any(|stage| touched.contains(stage)) {
+            return None;
+        }
+        let half = |of: &Hypothesis, effect: usize| {
+            let mut values = of.model.effect(effect)?.to_vec();
+            values[0] = 0.5 * (values[0] + specs[effect].parameters[0].off()?);
+            Some(values)
+        };
+        let (kept, own) = (half(base, replaced)?, half(rival, added)?);
+        let mut model = base.model.clone();
+        model.effects.retain(|(effect, _)| *effect != replaced);
+        for &p in touched.iter().flat_map(|stage| &simulator.stages()[*stage].parameters) {
+            model.parameters[p] = 0.5 * (model.parameters[p] + rival.model.parameters[p]);
+        }
+        Some(model.with(replaced, &kept).with(added, &own))
+    }
+
     /// Fits a set again from the parameters as shipped if parameters are at the ends of their
     /// tolerances and the gap exceeds [`LEFT`]. Returns the better fit. Such parameters may have
     /// compensated for an effect before it was added, and then keep the effect at wrong values.

@@ -143,6 +143,7 @@ fn proposed(
 ) -> Proposed {
     let spec = &residue.compare.simulator().stages()[residue.stage];
     let signals = scales(&residue.inputs);
+    let time_scales_s = [residue.inputs.trial_s, residue.inputs.session_s];
     let pairs = sum.terms.iter().zip(estimated.coefficients.iter().zip(&estimated.sd));
     let terms: Vec<ProposedTerm> = pairs
         .filter(|_| weighed.stands)
@@ -157,11 +158,11 @@ fn proposed(
     let mut proposed = Proposed {
         stage: spec.name.clone(),
         channel: spec.channel.clone(),
-        equation: equation(&spec.channel, &terms, &signals),
+        equation: equation(&spec.channel, &terms, &signals, time_scales_s),
         acts: acts(&spec.name, &terms),
         terms,
         signals,
-        time_scales_s: [residue.inputs.trial_s, residue.inputs.session_s],
+        time_scales_s,
         initial: "settled at the start of every trial".into(),
         closes_held: weighed.closes,
         closes_test,

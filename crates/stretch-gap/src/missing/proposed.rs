@@ -96,8 +96,14 @@ pub(crate) fn scales(inputs: &TermInputs) -> Vec<SignalScale> {
     inputs.signals.iter().map(one).collect()
 }
 
-/// Returns the equation `channel += ...`, followed by the definitions of its symbols.
-pub(crate) fn equation(channel: &str, terms: &[ProposedTerm], signals: &[SignalScale]) -> String {
+/// Returns the equation `channel += ...`, followed by the definitions of its symbols. `time_scales_s` are those of
+/// [`Proposed`].
+pub(crate) fn equation(
+    channel: &str,
+    terms: &[ProposedTerm],
+    signals: &[SignalScale],
+    time_scales_s: [f64; 2],
+) -> String {
     if terms.is_empty() {
         return String::new();
     }
@@ -127,6 +133,11 @@ pub(crate) fn equation(channel: &str, terms: &[ProposedTerm], signals: &[SignalS
         if speaks("v", s) {
             let rate = three_digits(s.rate_per_s * s.scale);
             letters.push(format!("v[{name}] = (d {name}/dt)/({rate} {}/s)", s.unit));
+        }
+    }
+    for (letter, scale_s) in ["T_trial", "T_session"].into_iter().zip(time_scales_s) {
+        if terms.iter().any(|t| t.name.contains(letter)) {
+            letters.push(format!("{letter} = {} s", three_digits(scale_s)));
         }
     }
     let with = if letters.is_empty() { String::new() } else { format!("; {}", letters.join(", ")) };
@@ -207,9 +218,9 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
         Factor::TravelFade { signal, width } => {
             format!("exp(-travel({})/{})", x(signal), three_digits(width))
         }
-        Factor::Time { power } => raised("(time in trial/T)".into(), power),
+        Factor::Time { power } => raised("(time in trial/T_trial)".into(), power),
         Factor::TimeFade { tau_s } => format!("exp(-time in trial/{} s)", three_digits(tau_s)),
-        Factor::Session { power } => raised("(session time/T)".into(), power),
+        Factor::Session { power } => raised("(session time/T_session)".into(), power),
     }
 }
 

@@ -6,6 +6,8 @@ use crate::missing::{
     term::{Factor, Passage, RateForm, Term},
 };
 
+const TIMES_S: [f64; 2] = [10.0, 100.0];
+
 fn signals() -> Vec<crate::missing::SignalScale> {
     let signals = vec![signal("rod_mm", wave(100), false), signal("valve", wave(100), true)];
     scales(&inputs(signals, &[100]))
@@ -20,11 +22,11 @@ fn proposed(terms: Vec<ProposedTerm>, random: bool) -> Proposed {
     Proposed {
         stage: "gauge".into(),
         channel: "volts".into(),
-        equation: equation("volts", &terms, &signals()),
+        equation: equation("volts", &terms, &signals(), TIMES_S),
         acts: acts("gauge", &terms),
         terms,
         signals: signals(),
-        time_scales_s: [10.0, 100.0],
+        time_scales_s: TIMES_S,
         initial: "settled at the start of every trial".into(),
         closes_held: 0.9,
         closes_test: 0.834,
@@ -42,7 +44,7 @@ fn an_equation_tells_each_of_its_letters_once() {
     let v = Factor::Rate { signal: 0, form: RateForm::Magnitude };
     let terms =
         [term(&[x, v], Passage::Direct, 0.0123), term(&[x], Passage::Lag { tau_s: 2.0 }, -1.5)];
-    let told = equation("volts", &terms, &signals());
+    let told = equation("volts", &terms, &signals(), TIMES_S);
     let (sum, letters) = told.split_once("; ").expect("letters are told");
     assert_eq!(
         sum,
@@ -55,13 +57,16 @@ fn an_equation_tells_each_of_its_letters_once() {
     // A command is not scaled.
     let command = [term(&[Factor::Power { signal: 1, power: 2.0 }], Passage::Direct, 2.0)];
     assert_eq!(
-        equation("volts", &command, &signals()),
+        equation("volts", &command, &signals(), TIMES_S),
         "volts += 2.00 V max(0, x[valve])^2; x[valve] = valve"
     );
-    // A term of time alone and an empty sum have no letters to define.
+    // A term of time names its scale. An empty sum has no letters to define.
     let clock = [term(&[Factor::Time { power: 0.5 }], Passage::Direct, 2e-9)];
-    assert_eq!(equation("volts", &clock, &signals()), "volts += 2.00e-9 V (time in trial/T)^0.5");
-    assert_eq!(equation("volts", &[], &signals()), "");
+    assert_eq!(
+        equation("volts", &clock, &signals(), TIMES_S),
+        "volts += 2.00e-9 V (time in trial/T_trial)^0.5; T_trial = 10.0 s"
+    );
+    assert_eq!(equation("volts", &[], &signals(), TIMES_S), "");
 }
 
 #[test]

@@ -4,7 +4,7 @@
 use stretch_core::{
     Branch, Calibration, Poly13, RateEstimator, SampleRate, fixed::FixedPoly13, record::SCHEMA,
 };
-use stretch_filter::{SgFilter, SgShape};
+use stretch_filter::{FixedSgIntegers, SgFilter, SgShape};
 use stretch_receptor::{
     ReceptorError, StretchReceptor,
     code::{CodeMap, CodeSurface, FixedNumbers, Scaled, Span},
@@ -21,39 +21,23 @@ use crate::{
 pub(crate) fn surfaces_fixed(numbers: &FixedNumbers, rate_hz: SampleRate) -> Part {
     let FixedNumbers { adc_bits, falling, dead_band, surfaces, rate } = numbers;
     let adc_bits = u32::from((*adc_bits).min(16));
-    let (factor, shift) = (rate.change_factor, rate.change_shift);
     let mut constants = Constants::default();
+    constants.define("CODES", 1u32 << adc_bits, "number of codes").define(
+        "ALIGN",
+        1u32 << (16 - adc_bits),
+        "factor that shifts a code to the upper end of 16 bits",
+    );
+    rate_constants(&mut constants, rate);
+    let rate_bits = rate_hz.hz().to_bits();
     constants
-        .define("CODES", 1u32 << adc_bits, "number of codes")
-        .define(
-            "ALIGN",
-            1u32 << (16 - adc_bits),
-            "factor that shifts a code to the upper end of 16 bits",
-        )
-        .define("WINDOW", rate.window as i32, "samples")
-        .define("DEGREE", rate.degree as i32, "of the polynomial that gives the rate");
-    for k in 0..=rate.degree {
-        constants.define(&format!("WEIGHT_{k}"), rate.weights[k], "");
-    }
-    for k in 1..=rate.degree {
-        constants.define(&format!("CHOOSE_{k}"), rate.choose[k] as u32, "");
-    }
-    let half = if rate.shift == 0 { 0 } else { 1i64 << (rate.shift - 1) };
-    constants
-        .define("SHIFT", rate.shift as i32, "low bits of the weighted sum that are rounded away")
-        .define("HALF", half, "")
-        .define("CHANGE", factor, "from a rate to a change per sample")
-        .define("CHANGE_SHIFT", shift as i32, "")
         .define("DEAD_BAND", *dead_band as u32, "the branch changes only at a rate above this one")
         .define(
             "MIRROR",
             if *falling { u32::MAX } else { 0 },
             "all ones if a rising signal means a falling target",
-        );
-    let [low, high] = halves(rate_hz.hz());
-    constants
-        .define("RATE_LOW", low, "bits of the sample rate as a double, in hertz")
-        .define("RATE_HIGH", high, "")
+        )
+        .define("RATE_LOW", rate_bits as u32, "bits of the sample rate as a double, in hertz")
+        .define("RATE_HIGH", (rate_bits >> 32) as u32, "")
         .define("SCHEMA", SCHEMA, "version of the binary calibration files that can be loaded");
     let (model, surface, has) = match surfaces {
         CodeMap::Line(ranged) => {
@@ -86,9 +70,25 @@ pub(crate) fn surfaces_fixed(numbers: &FixedNumbers, rate_hz: SampleRate) -> Par
     }
 }
 
-/// Returns the lower and the upper 32 bits of a number.
-fn halves(x: f64) -> [u32; 2] {
-    [0, 32].map(|shift| (x.to_bits() >> shift) as u32)
+/// Writes the integers of the rate estimator.
+fn rate_constants(constants: &mut Constants, rate: &FixedSgIntegers) {
+    constants.define("WINDOW", rate.window as i32, "samples").define(
+        "DEGREE",
+        rate.degree as i32,
+        "of the polynomial that gives the rate",
+    );
+    for k in 0..=rate.degree {
+        constants.define(&format!("WEIGHT_{k}"), rate.weights[k], "");
+    }
+    for k in 1..=rate.degree {
+        constants.define(&format!("CHOOSE_{k}"), rate.choose[k] as u32, "");
+    }
+    let half = if rate.shift == 0 { 0 } else { 1i64 << (rate.shift - 1) };
+    constants
+        .define("SHIFT", rate.shift as i32, "low bits of the weighted sum that are rounded away")
+        .define("HALF", half, "")
+        .define("CHANGE", rate.change_factor, "from a rate to a change per sample")
+        .define("CHANGE_SHIFT", rate.change_shift as i32, "");
 }
 
 fn span(span: &Span) -> String {

@@ -19,7 +19,7 @@ use super::{
     shared::{say_below, say_first, short_name},
 };
 use crate::display::{is_verbose, warn};
-use crate::table::table_text;
+use crate::table::{number, table_text};
 
 /// Evaluate calibrations on trials that have a reference
 ///
@@ -105,6 +105,9 @@ fn columns_of(calibration: &ArrayCalibration<MAX_CHANNELS>) -> impl Iterator<Ite
     channels.iter().map(|channel| channel.signal.as_str()).chain([reference.as_str()])
 }
 
+/// Code of the doubt about a shifted estimate.
+const SHIFTED: &str = "constant_error";
+
 /// Returns doubts about calibrations of several gauges, and about each gauge alone.
 fn array_doubts(
     calibrations: &[(&str, &ArrayCalibration<MAX_CHANNELS>)],
@@ -119,12 +122,27 @@ fn array_doubts(
         all.extend(fitted.map(|doubt| doubt.of(name)));
     }
     let specs = || calibrations.iter().map(|(_, own)| own.spec());
-    let fused = specs().map(|spec| spec.all.sd);
-    let alone = specs().flat_map(|spec| spec.alone.iter().map(|gains| gains.sd));
-    for (errors, sd) in evaluation.pooled.iter().zip(fused.chain(alone)) {
+    let (together, alone) = evaluation.pooled.split_at(calibrations.len());
+    for (errors, spec) in together.iter().zip(specs()) {
         let outside = Doubt::of_clamped(errors.clamped, errors.samples);
-        let doubts = Doubt::of_errors(errors, sd, &evaluation.unit).chain(outside);
+        let doubts = Doubt::of_errors(errors, spec.all.sd, &evaluation.unit).chain(outside);
         all.extend(doubts.map(|doubt| doubt.of(&errors.method)));
+    }
+    let gains = specs().flat_map(|spec| &spec.alone);
+    let shifted = alone.iter().zip(gains).filter(|(errors, gains)| {
+        let mut doubts = Doubt::of_errors(errors, gains.sd, &evaluation.unit);
+        doubts.any(|doubt| doubt.code == SHIFTED)
+    });
+    let shifted = shifted.map(|(errors, _)| {
+        format!("{} by {} {}", errors.method, number(errors.bias), evaluation.unit)
+    });
+    let shifted: Vec<String> = shifted.collect();
+    if !shifted.is_empty() {
+        let text = format!(
+            "was a gauge put on again? On average, these estimates differ from the reference: {}; calibrate again",
+            shifted.join(", ")
+        );
+        all.push(Doubt { code: SHIFTED, text });
     }
     all
 }

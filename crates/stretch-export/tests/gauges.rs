@@ -113,17 +113,22 @@ enum Row {
 }
 
 /// Returns a motion that all gauges share, with every fault now and then, gaps of one gauge and of the recorder, and
-/// readmitted gauges.
+/// readmitted gauges. At the end, no gauge has a fault.
 fn rows(runner: &mut TestRunner, channels: usize) -> Vec<Row> {
     let mut below = |n: usize| (0..n).new_tree(runner).unwrap().current();
     let mut out = Vec::new();
     let (mut offset, mut stuck, mut gone) =
         (vec![0.0; channels], vec![None; channels], vec![0; channels]);
     let mut silent = 0;
-    for n in 0..4000 {
+    for n in 0..5500 {
         let motion = 0.5 + 0.45 * (n as f64 / 40.0).sin();
         let k = below(channels);
-        match below(400) {
+        if n == 4000 {
+            // From here on no gauge has a fault, so that lost gauges are used again.
+            offset.fill(0.0);
+            stuck.fill(None);
+        }
+        match if n < 4000 { below(400) } else { 399 } {
             0 => offset[k] += 1.0 + below(10) as f64 / 10.0,
             1 => stuck[k] = Some(motion),
             2 => gone[k] = 1 + below(8),

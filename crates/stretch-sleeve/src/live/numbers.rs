@@ -10,7 +10,7 @@ use crate::{
 use super::samples_a_tick;
 
 /// Ticks without a fault, of about 10 ms each, after which a lost channel is used again.
-const RECOVERY_TICKS: u32 = 200;
+const RECOVERY_TICKS: u32 = 1000;
 
 /// The numbers of an [`ArrayReceptor`](crate::ArrayReceptor).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,8 +21,9 @@ pub struct ArrayNumbers<T, const N: usize> {
     pub relaxations: usize,
     /// Samples between two comparisons of the channels.
     pub samples_a_tick: u16,
-    /// Samples in a row without a fault after which a lost channel that has not slipped is used again: about two
-    /// seconds, which is longer than any limit for equal samples.
+    /// Samples in a row without a fault after which a lost channel that has not slipped is used again: about ten
+    /// seconds, which is longer than any limit for equal samples, and longer than a usual movement, so that a channel
+    /// that saturates in each movement stays lost.
     pub samples_to_recover: u32,
     /// Share of the distance to its input that each low-pass covers in a sample.
     pub shares: [T; ARRAY_RELAXATIONS],

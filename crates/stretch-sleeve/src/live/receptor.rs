@@ -25,7 +25,7 @@ use super::{
 ///      them slipped. As soon as a channel is lost, no further slips are searched for.
 ///
 ///    A channel that slipped stays lost until [`ArrayMemory::readmit`] is called. Any other lost channel is used again,
-///    as if its next sample were its first, after about two seconds without such a fault
+///    as if its next sample were its first, after about ten seconds without such a fault
 ///    ([`ArrayNumbers::samples_to_recover`]).
 /// 2. The states of each channel are computed, each shifted and scaled into its domain.
 /// 3. The gains for the remaining channels are selected: for all, for all but one, or for the best single channel.

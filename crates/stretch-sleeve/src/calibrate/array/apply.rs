@@ -84,6 +84,31 @@ pub fn apply_array(
 ///
 /// # Errors
 /// As [`evaluate`](stretch_calibrate::evaluate()).
+///
+/// ```
+/// use stretch_data::{Channel, Trial};
+/// use stretch_sleeve::{evaluate_arrays, example_array};
+/// let wave = |n: usize| 1.5 + 0.4 * (0.05 * n as f64).sin();
+/// let column = |name: &str, of: fn(f64) -> f64| Channel {
+///     name: name.into(),
+///     values: (0..500).map(|n| of(wave(n))).collect(),
+/// };
+/// let trial = Trial {
+///     name: "knee".into(),
+///     time_s: (0..500).map(|n| 0.01 * n as f64).collect(),
+///     channels: vec![
+///         column("front_v", |v| v),
+///         column("back_v", |v| v + 0.1), // put on again
+///         column("angle_deg", |v| 90.0 * (v - 1.0)),
+///     ],
+/// };
+/// let both = serde_json::from_value(serde_json::to_value(example_array())?)?;
+/// let pooled = evaluate_arrays(&[("both", &both)], &[trial])?.pooled;
+/// let methods: Vec<&str> = pooled.iter().map(|errors| errors.method.as_str()).collect();
+/// assert_eq!(methods, ["both", "front_v alone", "back_v alone"]);
+/// assert!(pooled[1].rmse < pooled[0].rmse && pooled[0].rmse < pooled[2].rmse);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn evaluate_arrays(
     calibrations: &[(&str, &ArrayCalibration<MAX_CHANNELS>)],
     trials: &[Trial],

@@ -438,24 +438,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     outputs.file(&args.out, |out| out.write_all(&record))?;
     let test = read_trials(&args.test, Split::Test, &columns)?;
-    let evaluation = match &args.report {
-        None => {
-            let (name, judged) =
-                (options.model.to_string(), if test.is_empty() { &trials } else { &test });
-            evaluate_errors(&[(&name, &calibrated.calibration)], judged)
-        }
-        Some(path) => {
-            // The line is the baseline with which every surface is compared.
-            let linear = Options { model: ModelKind::Linear, ..options.clone() };
-            let linear = calibrate(&trials, &linear).map_err(named)?;
-            let fitted = [&linear, &calibrated];
-            let (page, evaluation) =
-                report(&trials, &test, fitted, (&ranking, choice.as_ref()), &options)?;
-            stage_text(&mut outputs, path, &page)?;
-            Ok(evaluation)
-        }
-    };
-    let judged = verdict(&calibrated, &trials, evaluation, &options);
+    let chosen = (&ranking[..], choice.as_ref());
+    let judged = judge(&args, &mut outputs, &calibrated, [&trials, &test], chosen, &options)?;
     let answer = serde_json::json!({
         "signal": options.signal,
         "candidates": ranking,
@@ -522,6 +506,30 @@ fn choose(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateE
     let choice = choose_model_watched(trials, options, &show);
     bar.finish_and_clear();
     choice
+}
+
+/// Evaluates a calibration on the test trials, or on the fitted trials if there are none. Adds the report to the
+/// outputs, if there is one, and returns the sentence with the error.
+fn judge(
+    args: &Args,
+    outputs: &mut Outputs,
+    calibrated: &Calibrated,
+    [trials, test]: [&[Trial]; 2],
+    chosen: (&[Candidate], Option<&ModelChoice>),
+    options: &Options,
+) -> anyhow::Result<String> {
+    let Some(path) = &args.report else {
+        let name = options.model.to_string();
+        let judged = if test.is_empty() { trials } else { test };
+        let evaluation = evaluate_errors(&[(&name, &calibrated.calibration)], judged);
+        return Ok(verdict(calibrated, trials, evaluation, options));
+    };
+    // The line is the baseline with which every surface is compared.
+    let linear = Options { model: ModelKind::Linear, ..options.clone() };
+    let linear = calibrate(trials, &linear).map_err(|error| of_files(error, &args.trials))?;
+    let (page, evaluation) = report(trials, test, [&linear, calibrated], chosen, options)?;
+    stage_text(outputs, path, &page)?;
+    Ok(verdict(calibrated, trials, Ok(evaluation), options))
 }
 
 /// Returns the sentence with the error of a calibration.

@@ -213,15 +213,7 @@ pub fn evaluate_methods(
         let mut reference = reference.into_owned();
         let mut methods = estimates(trial, &reference)?;
         if let Some(turn) = turn {
-            // The turn of an angle that wraps is unknown, so the reference is shifted to the turn of the first
-            // calibration's estimates.
-            let off = reference.iter().zip(&methods[all.first].values).map(|(x, y)| y - x);
-            let known: Vec<f64> = off.filter(|off| off.is_finite()).collect();
-            let shift =
-                turn * (known.iter().sum::<f64>() / known.len().max(1) as f64 / turn).round();
-            reference.iter_mut().for_each(|x| *x += shift);
-            let uncalibrated = methods.iter_mut().take(all.first);
-            uncalibrated.flat_map(|method| &mut method.values).for_each(|x| *x += shift);
+            onto_first_turn(&mut reference, &mut methods, all.first, turn);
         }
         let rate_hz = sample_rate_hz(trial)?;
         let period_s = 1.0 / rate_hz;
@@ -256,6 +248,17 @@ pub fn evaluate_methods(
         pooled: pooled.collect::<Result<_, _>>()?,
         comparisons: tests.compare(names),
     })
+}
+
+/// Shifts an angle that wraps, whose turn is unknown, to the turn of the first calibration's estimates. The methods
+/// before the first calibration are shifted with it.
+fn onto_first_turn(reference: &mut [f64], methods: &mut [Estimates], first: usize, turn: f64) {
+    let off = reference.iter().zip(&methods[first].values).map(|(x, y)| y - x);
+    let known: Vec<f64> = off.filter(|off| off.is_finite()).collect();
+    let shift = turn * (known.iter().sum::<f64>() / known.len().max(1) as f64 / turn).round();
+    reference.iter_mut().for_each(|x| *x += shift);
+    let uncalibrated = methods.iter_mut().take(first);
+    uncalibrated.flat_map(|method| &mut method.values).for_each(|x| *x += shift);
 }
 
 /// Returns the uncalibrated signal, with its extremes scaled to those of the reference.

@@ -151,9 +151,6 @@ pub(crate) fn words(term: &Term, signals: &[SignalScale]) -> String {
     match term.passage {
         Passage::Direct => product,
         Passage::Lag { tau_s } => format!("lag({product}, {} s)", three_digits(tau_s)),
-        Passage::Rest { tau_s } => {
-            format!("({product} - lag({product}, {} s))", three_digits(tau_s))
-        }
         Passage::Leak { tau_s } => format!("leak({product}, {} s)", three_digits(tau_s)),
     }
 }

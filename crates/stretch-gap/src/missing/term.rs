@@ -99,8 +99,6 @@ pub enum Passage {
     Direct,
     /// Through a first-order lag, z' = (g - z)/tau, with z = 0 at a trial's start.
     Lag { tau_s: f64 },
-    /// Through a high-pass: g - z, where z is the lag of g as in `Lag`.
-    Rest { tau_s: f64 },
     /// Through an integrator that leaks while valves are open: z' = g/tau - (sum of commands)
     /// z/tau, with z = 0 at a trial's start. A negative sum counts as 0.
     Leak { tau_s: f64 },
@@ -171,9 +169,7 @@ impl Term {
         });
         let passage = match &mut self.passage {
             Passage::Direct => None,
-            Passage::Lag { tau_s } | Passage::Rest { tau_s } | Passage::Leak { tau_s } => {
-                Some((tau_s, true))
-            }
+            Passage::Lag { tau_s } | Passage::Leak { tau_s } => Some((tau_s, true)),
         };
         factors.chain(passage).collect()
     }
@@ -392,10 +388,6 @@ impl Passage {
                 Self::Lag { tau_s } => {
                     let z = lagged(inputs, own, tau_s, 0.0);
                     own.copy_from_slice(&z);
-                }
-                Self::Rest { tau_s } => {
-                    let z = lagged(inputs, own, tau_s, 0.0);
-                    own.iter_mut().zip(z).for_each(|(g, z)| *g -= z);
                 }
                 Self::Leak { tau_s } => {
                     let open: Vec<&[f64]> = inputs

@@ -156,9 +156,7 @@ fn memories_begin_anew_with_every_trial() {
         Turned { signal: 0, width: 0.1 },
         Travel { signal: 0, power: 1.0 },
     ];
-    let leak = Passage::Leak { tau_s: 0.3 };
-    let passages =
-        [Passage::Direct, Passage::Lag { tau_s: 0.4 }, Passage::Rest { tau_s: 0.4 }, leak];
+    let passages = [Passage::Direct, Passage::Lag { tau_s: 0.4 }, Passage::Leak { tau_s: 0.3 }];
     for factor in factors {
         for passage in passages {
             let all = Term::new(&[factor], passage).values(&inputs, 2);
@@ -198,14 +196,10 @@ fn a_product_is_that_of_its_factors_and_nothing_is_one() {
     assert_like(&of(&[a, b]), product);
 }
 
-/// The passages `Lag` and `Rest` of a product of factors add up to the product itself. For the
-/// constant product 1, the lag starts from 0 and is 1 - exp(-t/tau).
+/// For the constant product 1, the lag starts from 0 and is 1 - exp(-t/tau).
 #[test]
-fn passages_part_what_they_are_given() {
+fn a_lag_starts_at_rest() {
     let inputs = inputs(vec![signal("x", wave(300), false)], &[300]);
-    let of = |passage| Term::new(&[Power { signal: 0, power: 1.0 }], passage).values(&inputs, 1);
-    let (lag, rest) = (of(Passage::Lag { tau_s: 0.3 }), of(Passage::Rest { tau_s: 0.3 }));
-    assert_like(&of(Passage::Direct), lag.iter().zip(&rest).map(|(a, b)| a + b));
     let one = Term::new(&[], Passage::Lag { tau_s: 0.3 }).values(&inputs, 1);
     for (i, z) in one.iter().enumerate().skip(1) {
         // The test allows the lag to start at the first sample, or one sample earlier or later.

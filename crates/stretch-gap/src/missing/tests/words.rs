@@ -95,7 +95,7 @@ fn what_leaks_acts_in_the_rate() {
 #[test]
 fn a_proposal_goes_through_json_whole() {
     let x = Factor::Above { signal: 0, at: 0.25, power: 2.0 };
-    let told = proposed(vec![term(&[x], Passage::Rest { tau_s: 0.5 }, 0.5)], false);
+    let told = proposed(vec![term(&[x], Passage::Lag { tau_s: 0.5 }, 0.5)], false);
     let text = serde_json::to_string(&told).expect("written");
     assert_eq!(serde_json::from_str::<Proposed>(&text).expect("read"), told);
 }

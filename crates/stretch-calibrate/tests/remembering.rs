@@ -107,6 +107,17 @@ fn what_was_fitted_is_what_runs() {
     }
 }
 
+/// The noise of the trials exceeds the ends of the fitted curve.
+#[test]
+fn the_samples_of_a_fit_are_inside_its_range() {
+    let trials = wandering();
+    for kind in [Memory::Observer, Memory::History] {
+        let calibration = calibrate(&trials, &options(kind, false)).unwrap().calibration;
+        let evaluation = evaluate(&[("x", &calibration)], &trials).unwrap();
+        assert_eq!(evaluation.pooled[1].clamped, 0, "{kind}");
+    }
+}
+
 #[test]
 fn auto_takes_a_model_that_remembers_where_that_shows() {
     let choice = choose_model(&wandering(), &Options::default()).unwrap();

@@ -122,6 +122,7 @@ impl Frame {
                     Domain::SignalClamped => b'1',
                     Domain::RateClamped => b'2',
                     Domain::BothClamped => b'3',
+                    Domain::EstimateClamped => b'4',
                 });
             }
             Answer::Warming => out.bytes(b",W,"),
@@ -167,6 +168,7 @@ impl Frame {
                     b"1" => Domain::SignalClamped,
                     b"2" => Domain::RateClamped,
                     b"3" => Domain::BothClamped,
+                    b"4" => Domain::EstimateClamped,
                     _ => return None,
                 };
                 Answer::Reading { thousandths: number(thousandths)?, branch, domain }

@@ -11,7 +11,8 @@ fn answer() -> impl Strategy<Value = Answer> {
         Just(Domain::Inside),
         Just(Domain::SignalClamped),
         Just(Domain::RateClamped),
-        Just(Domain::BothClamped)
+        Just(Domain::BothClamped),
+        Just(Domain::EstimateClamped)
     ];
     prop_oneof![
         8 => (any::<i32>(), branch, domain)

@@ -19,7 +19,7 @@ use crate::{
 /// 1. the baseline (the drifting signal at rest) is updated, if the calibration has one;
 /// 2. the states of [`HistoryMap`] are computed and clamped to their domains ([`Reading::domain`] shows whether one was
 ///    outside);
-/// 3. the polynomial gives the estimate, limited to the fitted range;
+/// 3. the polynomial gives the estimate, limited to the fitted range ([`Domain::EstimateClamped`] if only this limit applied);
 /// 4. the estimator `R` gives the rate of the estimate. Outside the dead band, which is converted to the reference, the
 ///    sign of the rate gives the branch.
 ///
@@ -208,7 +208,10 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> History<T, R> {
         let (states, signal_outside, memory_outside) = self.states(memory, signal);
         let free = self.polynomial(&states);
         let estimate = free.max(self.low).min(self.high);
-        let domain = Domain::from_flags(signal_outside || estimate != free, memory_outside);
+        let domain = match Domain::from_flags(signal_outside, memory_outside) {
+            Domain::Inside if estimate != free => Domain::EstimateClamped,
+            domain => domain,
+        };
         (estimate, self.rate.step(&mut memory.rate, estimate), domain)
     }
 }

@@ -49,6 +49,8 @@ pub enum Domain {
     RateClamped,
     /// Both inputs were outside, and were clamped.
     BothClamped,
+    /// The inputs were inside, but the estimate was outside the range of the fitted reference, and was clamped.
+    EstimateClamped,
 }
 
 impl Domain {
@@ -70,6 +72,7 @@ impl fmt::Display for Domain {
             Self::SignalClamped => "signal_clamped",
             Self::RateClamped => "rate_clamped",
             Self::BothClamped => "both_clamped",
+            Self::EstimateClamped => "estimate_clamped",
         })
     }
 }

@@ -63,6 +63,20 @@ fn shape_of_the_terms() {
     assert_eq!(shape.terms(), TERMS);
 }
 
+#[test]
+fn an_estimate_that_is_limited_has_its_own_word() {
+    let domain = |constant: f64| {
+        let mut coefficients = [0.0; TERMS];
+        coefficients[0] = constant;
+        let calibration = history(None, &coefficients);
+        let mut receptor = Runner::new(Receptor::<f64>::new(&calibration).unwrap());
+        let readings = (0..40).map(|_| receptor.step(Volts(1.5)));
+        readings.last().and_then(Result::ok).map(|reading| reading.domain.to_string())
+    };
+    assert_eq!(domain(0.5).as_deref(), Some("inside"));
+    assert_eq!(domain(2.0).as_deref(), Some("estimate_clamped"));
+}
+
 fn rest() -> impl Strategy<Value = Option<RestTracker>> {
     prop_oneof![Just(None), Just(Some(REST))]
 }

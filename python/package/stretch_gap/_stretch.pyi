@@ -54,8 +54,9 @@ class Reading:
     def domain(self) -> str:
         """Position of the sample relative to the fitted range.
 
-        The value is `"inside"`, `"signal_clamped"`, `"rate_clamped"` or `"both_clamped"`. A signal or a rate outside the fitted
-        range is clamped to the end of the range, because a calibration is never extrapolated.
+        The value is `"inside"`, `"signal_clamped"`, `"rate_clamped"`, `"both_clamped"` or `"estimate_clamped"`. A signal or a
+        rate outside the fitted range is clamped to the end of the range, because a calibration is never extrapolated.
+        `"estimate_clamped"` means that only the estimate was limited to the fitted range.
         """
     @property
     def sd(self) -> float | None:

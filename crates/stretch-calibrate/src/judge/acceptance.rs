@@ -47,17 +47,14 @@ pub fn explains_little(fits: &[FitReport]) -> Option<String> {
     })
 }
 
-/// Question about a log whose samples lie outside the range of the calibration.
-pub(super) const IS_IT_THE_SENSOR: &str =
-    "is it the calibrated sensor, in the same unit? If so, calibrate on trials with this range";
-
 /// Returns a sentence for a log in which most samples lie outside the calibrated domain.
 ///
 /// Most means more than half. The estimates of such a log are mostly those at the ends of the domain.
 pub(super) fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
     (2 * clamped > samples).then(|| {
         format!(
-            "{} % of the samples lie outside the range of the calibration and were limited to it: {IS_IT_THE_SENSOR}",
+            "{} % of the samples have a signal or a rate of change outside the range of the calibration, and were limited to it: the \
+             estimates are less accurate there; calibrate on trials with this range and these speeds",
             share(clamped, samples)
         )
     })

@@ -3,7 +3,7 @@
 use std::fmt;
 
 use serde::Serialize;
-use stretch_core::{Calibration, Provenance};
+use stretch_core::{Calibration, Provenance, Range};
 use stretch_data::{Trial, out_of_order, rate_of};
 use stretch_receptor::{Domain, Reading, Withheld};
 
@@ -89,8 +89,9 @@ pub struct Seen {
     pub samples: u64,
     /// Samples without an estimate.
     pub withheld: u64,
-    /// Samples outside the calibrated domain.
+    /// Samples outside the calibrated domain: see [`MethodErrors::clamped`](crate::MethodErrors::clamped).
     pub clamped: u64,
+    range: Range<f64>,
     reach: Reach,
     pace: Pace,
 }
@@ -99,7 +100,8 @@ impl Seen {
     /// Returns empty counts for a calibration.
     pub fn of(calibration: &Calibration) -> Self {
         let (reach, pace) = (Reach::of(calibration), Pace::of(calibration));
-        Self { samples: 0, withheld: 0, clamped: 0, reach, pace }
+        let range = calibration.spec().signal_range;
+        Self { samples: 0, withheld: 0, clamped: 0, range, reach, pace }
     }
 
     /// Counts a sample with its time in seconds and its reading. Returns a doubt, at most once, if samples come at
@@ -113,7 +115,7 @@ impl Seen {
         self.samples += 1;
         self.reach.take(signal);
         match reading {
-            Ok(reading) => self.clamped += u64::from(reading.domain != Domain::Inside),
+            Ok(reading) => self.clamped += u64::from(is_outside(&self.range, signal, reading)),
             Err(_) => self.withheld += 1,
         }
         self.pace.take(time_s)
@@ -122,6 +124,18 @@ impl Seen {
     /// Returns a doubt if the samples so far are probably not a log of the calibration's sensor.
     pub fn doubt(&self) -> Option<Doubt> {
         outside(&self.reach, self.clamped, self.samples - self.withheld)
+    }
+}
+
+/// Whether a signal, or its rate of change, is outside the range of a calibration's own trials.
+///
+/// A model limits the signal to the ends of its fitted curve, which lie inside this range because the trials have noise.
+/// The samples of the fit are therefore inside, although some of them are limited.
+pub(super) fn is_outside(range: &Range<f64>, signal: f64, reading: &Reading) -> bool {
+    match reading.domain {
+        Domain::Inside | Domain::EstimateClamped => false,
+        Domain::SignalClamped => !range.contains(signal),
+        Domain::RateClamped | Domain::BothClamped => true,
     }
 }
 
@@ -178,8 +192,13 @@ pub fn evaluation_doubts(
         let unit = spec.target.reference_per_normalised(spec.target_range).abs();
         let said = Doubt::of_errors(errors, unit * spec.model.fit_rmse(), &evaluation.unit);
         let outside = outside(&reach, errors.clamped, errors.samples);
-        // A shift comes first, because it also puts samples outside the range.
-        all.extend(said.chain(outside).map(|doubt| doubt.of(name)));
+        // Another unit, or a sensor that is not connected, explains every other doubt.
+        let explains = |doubt: &Doubt| matches!(doubt.code, "other_unit" | "constant_signal");
+        match outside {
+            Some(cause) if explains(&cause) => all.push(cause.of(name)),
+            // A shift comes first, because it also puts samples outside the range.
+            outside => all.extend(said.chain(outside).map(|doubt| doubt.of(name))),
+        }
     }
     all
 }

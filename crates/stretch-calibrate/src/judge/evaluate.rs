@@ -4,14 +4,13 @@ use serde::Serialize;
 use stretch_core::{Calibration, Polarity};
 use stretch_data::{Trial, check_rows, unit_of};
 use stretch_metrics::{Agreement, Delta, PairedBlocks, PairedT, TTest, lag};
-use stretch_receptor::Domain;
 
 use crate::{
     CalibrateError,
     prepare::{MOST_ROWS, extent, polarity, sample_rate_hz},
 };
 
-use super::apply::apply;
+use super::{apply::apply, doubt::is_outside};
 
 /// Length of the blocks of the paired test, in seconds.
 const BLOCK_S: f64 = 0.5;
@@ -28,7 +27,8 @@ pub struct MethodErrors {
     pub samples: u64,
     /// Samples without an estimate: warm-up and gaps.
     pub withheld: u64,
-    /// Samples whose inputs were outside the calibrated domain.
+    /// Samples outside the calibrated domain: the signal was limited and is outside the range of the fitted trials
+    /// (`signal_range` of the calibration), or the rate of change was limited.
     pub clamped: u64,
     /// Root mean square error, in the unit of the reference.
     pub rmse: f64,
@@ -285,8 +285,12 @@ fn estimates(calibration: &Calibration, trial: &Trial) -> Result<Estimates, Cali
     let read = |of: fn(&stretch_receptor::Reading) -> f64| {
         applied.readings.iter().map(|r| r.as_ref().map_or(f64::NAN, of)).collect()
     };
-    let outside = |r: &&Result<_, _>| matches!(r, Ok(stretch_receptor::Reading { domain, .. }) if *domain != Domain::Inside);
-    let clamped = applied.readings.iter().filter(outside).count() as u64;
+    let spec = calibration.spec();
+    let samples = trial.require(spec.signal.as_str())?.iter().zip(&applied.readings);
+    let outside = |(signal, reading): &(&f64, &Result<_, _>)| {
+        reading.as_ref().is_ok_and(|reading| is_outside(&spec.signal_range, **signal, reading))
+    };
+    let clamped = samples.filter(outside).count() as u64;
     Ok(Estimates { values: read(|r| r.estimate), rates: read(|r| r.rate), clamped })
 }
 

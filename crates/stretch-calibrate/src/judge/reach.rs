@@ -5,12 +5,15 @@ use stretch_data::unit_of;
 
 use crate::{error::four_digits, prepare::extent};
 
-use super::{acceptance::IS_IT_THE_SENSOR, doubt::Doubt};
+use super::doubt::Doubt;
 
 /// Powers of ten with which a signal is multiplied to test other units: from nano to giga.
 const POWERS: std::ops::RangeInclusive<i32> = -9..=9;
 /// Number of powers.
 const COUNT: usize = 19;
+
+/// Distance from the range, as a share of its span, beyond which a sample is far outside.
+const FAR: f64 = 0.5;
 
 /// Smallest number of equal samples from which a sensor counts as not connected. Fewer may come from a rest and a
 /// coarse converter.
@@ -39,6 +42,10 @@ pub struct Reach {
     seen: Interval,
     /// For each power of ten, the number of samples that lie inside after multiplication by that power.
     inside: [u64; COUNT],
+    /// Number of samples that are [far](FAR) outside.
+    far: u64,
+    /// Sum of the distances from the range, as shares of its span.
+    excess: f64,
 }
 
 impl Reach {
@@ -46,7 +53,8 @@ impl Reach {
     pub fn of(calibration: &Calibration) -> Self {
         let unit = unit_of(calibration.spec().signal.as_str());
         let range = calibration.spec().signal_range;
-        Self { range, unit, samples: 0, seen: extent(std::iter::empty()), inside: [0; COUNT] }
+        let (seen, inside) = (extent(std::iter::empty()), [0; COUNT]);
+        Self { range, unit, samples: 0, seen, inside, far: 0, excess: 0.0 }
     }
 
     /// Counts a sample; missing samples are ignored.
@@ -57,13 +65,17 @@ impl Reach {
         self.samples += 1;
         self.seen.min = self.seen.min.min(signal);
         self.seen.max = self.seen.max.max(signal);
+        let excess = (signal - self.range.clamp(signal)).abs() / self.range.span();
+        self.excess += excess;
+        self.far += u64::from(excess > FAR);
         for (power, inside) in POWERS.zip(&mut self.inside) {
             *inside += u64::from(self.range.contains(signal * ten_to(power)));
         }
     }
 
     /// Returns a doubt about a log whose samples are all equal, or of which most samples lie outside the range. If most
-    /// samples would lie inside in another unit, the sentence names this unit.
+    /// samples would lie inside in another unit, the sentence names this unit. It asks whether this is the calibrated
+    /// sensor only if most samples are far outside.
     pub fn doubt(&self) -> Option<Doubt> {
         if self.samples >= CONSTANT && self.seen.min >= self.seen.max {
             let (count, value) = (thousands(self.samples), self.seen.min);
@@ -95,13 +107,29 @@ impl Reach {
                     format!("{sentence}: {asked}? {inside} lie inside when {how} by {by}"),
                 )
             }
-            None => ("outside_range", format!("{sentence}: {IS_IT_THE_SENSOR}")),
+            None => ("outside_range", format!("{sentence}{}", self.advice(outside))),
         };
         Some(Doubt::new(code, text))
     }
 }
 
 impl Reach {
+    /// Returns what to do about samples of which most are `outside` in every unit.
+    fn advice(&self, outside: u64) -> String {
+        if 2 * self.far > self.samples {
+            return ": is it the calibrated sensor, in the same unit? If so, calibrate on trials with this range"
+                .to_owned();
+        }
+        let mean = 100.0 * self.excess / outside as f64;
+        let share = |percent: f64| {
+            if percent < 1.0 { 0.1 * (10.0 * percent).ceil() } else { percent.round() }
+        };
+        format!(
+            " (they exceed it by {} % of its width on average): the estimates are less accurate there; calibrate on trials with this range",
+            four_digits(share(mean))
+        )
+    }
+
     /// Returns the power of ten that brings most samples inside, with their number. If several powers do so, because the
     /// range contains zero, it is the one that makes the samples about as wide as the range and belongs to a unit; `None`
     /// if there is none.
@@ -193,6 +221,12 @@ mod tests {
         // Values that no power of ten brings inside.
         let other = doubt([-1.0, -2.0, -3.0]).expect("all are outside");
         assert!(other.contains("the calibrated sensor"), "{other}");
+        // Slightly outside, as after the sensor has drifted.
+        let (max, span) =
+            (calibration.spec().signal_range.max(), calibration.spec().signal_range.span());
+        let near = doubt([max + 0.02 * span, max + 0.04 * span, middle]).expect("two are outside");
+        assert!(near.contains("by 3 % of its width"), "{near}");
+        assert!(!near.contains("the calibrated sensor"), "{near}");
         let other = doubt([1e2 * middle; 3]).expect("all are outside");
         assert!(other.contains("is the unit wrong? 3 lie inside when divided by 100"), "{other}");
     }
@@ -204,13 +238,9 @@ mod tests {
         let range = Range::new(RangeSpec { mode, zero: 0.0, min: -0.1, max: 1.0 }).unwrap();
         let inside = [0; COUNT];
         let told = |factor: f64| {
-            let mut reach = Reach {
-                range,
-                unit: "V".to_owned(),
-                samples: 0,
-                seen: extent(std::iter::empty()),
-                inside,
-            };
+            let seen = extent(std::iter::empty());
+            let unit = "V".to_owned();
+            let mut reach = Reach { range, unit, samples: 0, seen, inside, far: 0, excess: 0.0 };
             (0..=10).for_each(|i| reach.take(factor * (0.1 * f64::from(i) - 0.05)));
             reach.take(factor);
             reach.doubt().map(|doubt| doubt.text).unwrap_or_default()

@@ -143,6 +143,13 @@ impl FromStr for ModelKind {
         if let Some(kind) = Memory::ALL.into_iter().find(|kind| kind.to_string() == name) {
             return Ok(Self::Remembering { kind, rest });
         }
+        // A polynomial of the signal alone.
+        let degree =
+            ["quadratic", "cubic", "quartic", "quintic"].iter().position(|name| *name == text);
+        if let Some(instead) = degree.and_then(|i| ["poly02", "poly03", "poly04", "poly05"].get(i))
+        {
+            return Err(SpellingError::new(text, instead));
+        }
         let digits = text.strip_prefix("poly").ok_or_else(unknown)?;
         let [i, j] = digits.as_bytes() else { return Err(unknown()) };
         if !(i.is_ascii_digit() && j.is_ascii_digit()) {

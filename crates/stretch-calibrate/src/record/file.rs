@@ -144,6 +144,26 @@ fn without_turns(object: &str) -> Option<serde_json::Value> {
     value.as_object_mut()?.remove("turns").map(|_| value)
 }
 
+/// Returns what the text of a file is that is often taken for a calibration; `None` for a damaged calibration.
+fn other_kind(text: &str) -> Option<&'static str> {
+    let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
+    let first = first?;
+    if !first.starts_with('{') {
+        let is_section = first.starts_with('[') && first.ends_with(']');
+        return match is_section || first.contains(" = ") {
+            true => Some("a TOML file, such as a simulator or a problem,"),
+            false => Some("a text file, such as a recording (CSV),"),
+        };
+    }
+    let value: serde_json::Value = serde_json::from_str(text).ok()?;
+    match ["verdict", "fits", "pooled"].map(|field| value.get(field).is_some()) {
+        [true, ..] => Some("a diagnosis"),
+        [_, true, _] => Some("the answer of stretch calibrate --json"),
+        [.., true] => Some("the answer of stretch evaluate --json"),
+        _ => None,
+    }
+}
+
 fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, CalibrateError> {
     let unusable = |cause: String| {
         let problem = format!("{UNUSABLE}: {cause}");
@@ -164,6 +184,12 @@ fn from_json(text: &str, name: &str, seal: Seal) -> Result<Calibration, Calibrat
             let problem = format!(
                 "a calibration of several gauges can only be used by stretch apply, sleeve renew and export; to compare it with a \
                  reference, write its estimates with stretch apply --calibration {name} TRIAL.csv --out estimates.csv"
+            );
+            return CalibrateError::Record { file: name.to_owned(), problem };
+        }
+        if let Some(kind) = other_kind(text) {
+            let problem = format!(
+                "this is {kind} and not a calibration; give a file that stretch calibrate --out wrote, such as cal.json"
             );
             return CalibrateError::Record { file: name.to_owned(), problem };
         }

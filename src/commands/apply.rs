@@ -17,7 +17,7 @@ use stretch_sleeve::{
 
 use super::{
     apply_several::apply_several,
-    reading::{Recorded, read_recording, with_notes_printed},
+    reading::{Recorded, print_note, read_recording, with_notes_printed},
     shared::RecordedInput,
 };
 use crate::{
@@ -172,7 +172,7 @@ fn live(
     out.flush()?;
     let mut rows = RowReader::new(input, "standard input", options)?;
     let say = |notes: Vec<String>| {
-        notes.iter().for_each(|note| warn(format!("note: standard input: {note}")));
+        notes.iter().for_each(|note| print_note("standard input", note));
     };
     say(rows.take_notes());
     let (mut line, mut seen) = (Vec::new(), Seen::of(calibration));

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use stretch_data::{DataError, DataSet, Split, Trial};
-use stretch_recording::{ReadOptions, Recording, RecordingError, TimeColumn, tidy_column};
+use stretch_recording::{ReadOptions, Recording, RecordingError, TimeColumn, is_format_note, tidy_column};
 
 use super::shared::progress;
 use crate::display::{detail, warn};
@@ -70,11 +70,17 @@ pub(crate) fn read_recording(path: &Path, options: &ReadOptions) -> Result<Trial
     Ok(with_notes_printed(Recording::read(path, options)?))
 }
 
+/// Prints a note on a recording; with `-v` only, if the note describes its format and nothing else.
+pub(crate) fn print_note(name: &str, note: &str) {
+    match is_format_note(note) {
+        true => detail(format!("note: {name}: {note}")),
+        false => warn(format!("note: {name}: {note}")),
+    }
+}
+
 /// Prints the notes of a recording and returns its trial.
 pub(crate) fn with_notes_printed(Recording { trial, notes }: Recording) -> Trial {
-    for note in notes {
-        warn(format!("note: {}: {note}", trial.name));
-    }
+    notes.iter().for_each(|note| print_note(&trial.name, note));
     let names: Vec<&str> = trial.channels.iter().map(|channel| channel.name.as_str()).collect();
     let rate = trial.rate_hz().map_or(String::new(), |hz| format!(", {hz:.4} per second"));
     detail(format!("read {}: {} samples of {}{rate}", trial.name, trial.len(), names.join(", ")));

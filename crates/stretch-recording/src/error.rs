@@ -35,7 +35,7 @@ pub enum RecordingError {
     },
     /// Lines of text without a row of numbers.
     #[error(
-        "{file}: none of its first {lines} lines is a row of numbers (the first is \"{first}\"); write one line per sample, with a separator between its numbers"
+        "{file}: {} a row of numbers (the first is \"{first}\"); {}", none_of(*.lines), how_to_write(*.is_one_column)
     )]
     NoNumbers {
         /// The file.
@@ -44,6 +44,8 @@ pub enum RecordingError {
         lines: usize,
         /// The first line, shortened.
         first: String,
+        /// Whether a line below is a single number.
+        is_one_column: bool,
     },
     /// Rows of numbers without names above them.
     #[error(
@@ -309,6 +311,24 @@ pub enum RecordingError {
         /// The longest line that is accepted.
         limit: usize,
     },
+}
+
+/// Says that none of the first lines of a text is something.
+fn none_of(lines: usize) -> String {
+    match lines {
+        1 => "its first line is not".to_owned(),
+        lines => format!("none of its first {lines} lines is"),
+    }
+}
+
+/// Says how to write a recording.
+fn how_to_write(is_one_column: bool) -> &'static str {
+    match is_one_column {
+        true => {
+            "each line has one number only: name the column and give the rate, such as --columns gauge_mv --time 100hz, or record the time as well"
+        }
+        false => "write one line per sample, with a separator between its numbers",
+    }
 }
 
 impl RecordingError {

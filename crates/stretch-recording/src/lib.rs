@@ -22,6 +22,6 @@ pub use arrays::{Array, Clock};
 pub use error::RecordingError;
 pub use names::tidy_column;
 pub use options::{DateOrder, ReadOptions, TimeUnit};
-pub use recording::Recording;
+pub use recording::{Recording, is_format_note};
 pub use text::row_reader::{Row, RowReader};
 pub use time_column::{TimeColumn, parse_rate};

@@ -30,6 +30,26 @@ pub struct Recording {
     pub notes: Vec<String>,
 }
 
+/// Beginnings of the notes on a format that was read without a doubt.
+const CERTAIN: [&str; 5] = [
+    "columns named with their units: ",
+    "the time is column ",
+    "numbers have decimal commas",
+    "columns are separated by blanks",
+    "the names of the columns are in a comment",
+];
+
+/// Returns whether a note only describes the format of a recording, and nothing was left out, resampled or changed.
+///
+/// ```
+/// use stretch_recording::is_format_note;
+/// assert!(is_format_note("numbers have decimal commas"));
+/// assert!(!is_format_note("3 rows are left out because a clock has a gap there"));
+/// ```
+pub fn is_format_note(note: &str) -> bool {
+    CERTAIN.iter().any(|begin| note.starts_with(begin))
+}
+
 impl From<Recording> for SessionTrial {
     fn from(Recording { trial, notes }: Recording) -> Self {
         Self { notes, ..Self::new(trial) }

@@ -160,7 +160,9 @@ fn without_names_it_is_said_what_was_found() {
         &["at least 256 rows of 3 numbers from line 1 on, and no names above them"],
     );
     fails("a;b\nc;d\n", &ReadOptions::new(), &["none of its first 2 lines is a row of numbers"]);
-    fails("# nothing yet\n", &ReadOptions::new(), &["none of its first 1 lines"]);
+    fails("# nothing yet\n", &ReadOptions::new(), &["its first line is not a row of numbers"]);
+    let one = (0..300).map(|n| format!("{n}\n")).collect::<String>();
+    fails(&format!("gauge_mv\n{one}"), &ReadOptions::new(), &["one number only", "--time 100hz"]);
     fails("\n \n", &ReadOptions::new(), &["the file is empty"]);
     let four = ReadOptions::new().columns(["time_s", "a", "b", "c"]);
     fails(&rows(",", ""), &four, &["row 1: the row has 3 numbers, but --columns names 4"]);

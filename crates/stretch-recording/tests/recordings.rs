@@ -66,6 +66,16 @@ fn numpy() {
     assert!(stamps.trial.time_s.iter().zip(plain().time_s).all(|(a, b)| (a - b).abs() < 5e-7));
     let error = Recording::read(path("matrix.npy"), &ReadOptions::new()).expect_err("no names");
     assert!(error.to_string().contains("--columns"), "{error}");
+    // A matrix in Fortran order: its columns follow one another in the file.
+    let text = "{'descr': '|u1', 'fortran_order': True, 'shape': (4, 2), }";
+    let text = format!("{text:<117}\n");
+    let head = [b"\x93NUMPY\x01\x00", &(text.len() as u16).to_le_bytes()[..], text.as_bytes()];
+    let bytes = [&head.concat()[..], &[0, 1, 2, 3, 7, 8, 9, 5]].concat();
+    let read = |options| Recording::from_reader(&bytes[..], "f.npy", &options);
+    let error = read(ReadOptions::new()).expect_err("no names").to_string();
+    assert!(error.contains("shape [4, 2]"), "{error}");
+    let trial = read(ReadOptions::new().columns(["time_s", "gauge"])).expect("names").trial;
+    assert_eq!(trial.require("gauge").expect("there"), [7.0, 8.0, 9.0, 5.0]);
 }
 
 #[test]

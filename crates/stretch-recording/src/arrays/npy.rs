@@ -201,16 +201,25 @@ fn parse(
     };
     room.take_numbers(count.saturating_mul(fields.len()))?;
     let data = &bytes[begin..];
-    if is_fortran {
-        shape.reverse();
-    }
+    // A matrix is stored by columns; arrays of more dimensions keep the order of their bytes.
+    let by_columns = match (is_fortran, &shape[..]) {
+        (true, &[rows, columns]) => Some((rows, columns)),
+        (true, _) => {
+            shape.reverse();
+            None
+        }
+        (false, _) => None,
+    };
     let array = |(name, at, kind): Place| {
         // Dates are converted to the unit in which the reader of the time column will count them.
         let scale = match kind.letter {
             b'M' | b'm' => options.divisor(&name) / kind.per_second,
             _ => 1.0,
         };
-        let value = |i: usize| kind.value(&data[i * item + at..i * item + at + kind.bytes]) * scale;
+        let value = |i: usize| {
+            let i = by_columns.map_or(i, |(rows, columns)| i % columns * rows + i / columns);
+            kind.value(&data[i * item + at..i * item + at + kind.bytes]) * scale
+        };
         Array { name, shape: shape.clone(), values: (0..count).map(value).collect() }
     };
     Ok(Ok(fields.into_iter().map(array).collect()))

@@ -433,6 +433,7 @@ impl Finder<'_> {
                 file,
                 lines: self.lines.len(),
                 first: shown(&first.text),
+                is_one_column: self.lines.iter().any(|line| is_number(line.text.trim_ascii())),
             },
         }
     }

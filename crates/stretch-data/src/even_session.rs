@@ -199,10 +199,11 @@ impl EvenSession {
             self.notes.push("the trials are taken in the order of their start_s".into());
             return order;
         }
-        self.notes.push(
-            "start_s does not rise from trial to trial: the given order and pauses of 15 s are assumed"
-                .into(),
-        );
+        let why = match order.iter().all(|(_, start_s)| *start_s == 0.0) {
+            true => "no start_s of a trial is given",
+            false => "start_s does not rise from trial to trial",
+        };
+        self.notes.push(format!("{why}: the given order and pauses of 15 s are assumed"));
         let mut at_s = 0.0;
         trials
             .iter()

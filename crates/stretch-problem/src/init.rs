@@ -200,19 +200,24 @@ const NO_OUTPUT: &str = "
 fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
     let moves = |c: &&Known| c.range[1] > c.range[0];
     let moving = || columns.iter().filter(moves);
-    // A coarse encoder also repeats its values. A column with a name like a command is never an
+    // A coarse encoder also repeats its values. A column with a name like a command, and an estimate, is never an
     // output.
-    let output = moving().rfind(|c| !c.is_command()).or(moving().rfind(|c| !c.is_called));
+    let may_be = |c: &&Known| !c.is_called && !c.name.starts_with("estimate");
+    let output = moving().rfind(|c| may_be(c) && !c.is_held).or(moving().rfind(|c| may_be(c)));
     let Some(own) = output.map(|c| c.name.as_str()) else {
         return NO_OUTPUT.to_owned();
     };
     let commands = moving().filter(|c| c.is_command() && c.name != own);
     let mut commands: Vec<&str> = commands.map(|c| c.name.as_str()).collect();
     if commands.is_empty() {
-        // A measured force drives the output, unless the output is a force too.
+        // A measured force drives the output, unless the output is a force too. A single other column drives it as well.
         let is_force = |name: &&str| Quantity::of(name, "").is_some_and(Quantity::is_force);
         let others = moving().map(|c| c.name.as_str()).filter(|name| *name != own);
-        commands = others.filter(|name| is_force(name) && !is_force(&own)).collect();
+        let others: Vec<&str> = others.filter(|name| !name.starts_with("estimate")).collect();
+        commands = match others[..] {
+            [only] => vec![only],
+            _ => others.into_iter().filter(|name| is_force(name) && !is_force(&own)).collect(),
+        };
     }
     let inputs: Vec<String> = commands.iter().map(|name| quoted(name)).collect();
     let mut out = "\n# Guessed: the last column that is not a command is the output, and the commands drive the stage.\n"
@@ -265,7 +270,8 @@ fn rubbing<'a>(
 /// The noise of an output while its commands are constant, in all recordings except the test
 /// recordings.
 fn noise(output: &str, commands: &[&str], trials: &[(String, Trial)]) -> Option<Noise> {
-    let fitted = &trials[..trials.len() - tested(trials)];
+    let fitted = trials.iter().zip(is_tested(trials)).filter(|(_, is_tested)| !is_tested);
+    let fitted: Vec<&(String, Trial)> = fitted.map(|(trial, _)| trial).collect();
     let dt_s = 1.0 / fitted.first()?.1.rate_hz()?;
     let of = |name: &str| -> Vec<f64> {
         fitted.iter().flat_map(|(_, t)| t.channel(name).unwrap_or(&[])).copied().collect()
@@ -287,25 +293,33 @@ fn rounded(x: f64) -> f64 {
     (x / unit).round() * unit
 }
 
-/// Number of recordings, counted from the end, that are kept for testing.
-fn tested(trials: &[(String, Trial)]) -> usize {
-    match trials.len() {
-        1 => 0,
-        n => n.div_ceil(4),
+/// Whether each recording is kept for testing: the last quarter, the shorter of two, none of one.
+fn is_tested(trials: &[(String, Trial)]) -> Vec<bool> {
+    match trials {
+        [_] => vec![false],
+        [(_, a), (_, b)] => {
+            let is_first = a.duration_s() < b.duration_s();
+            vec![is_first, !is_first]
+        }
+        trials => (0..trials.len()).map(|i| i + trials.len().div_ceil(4) >= trials.len()).collect(),
     }
 }
 
 fn trials_of(trials: &[(String, Trial)]) -> String {
-    let tested = tested(trials);
+    let is_tested = is_tested(trials);
     let all = trials.len();
-    let mut out = match tested {
+    let mut out = match is_tested.iter().filter(|is_tested| **is_tested).count() {
         0 => "\n# There is one trial: its last quarter is held back for the test.\n".to_owned(),
-        _ => format!(
+        1 if all == 2 => {
+            "\n# Guessed: the shorter of 2 trials is used only for the test, once at the end.\n"
+                .to_owned()
+        }
+        tested => format!(
             "\n# Guessed: the last {tested} of {all} trials are used only for the test, once at the end.\n"
         ),
     };
-    for (i, (name, trial)) in trials.iter().enumerate() {
-        let split = if i + tested >= trials.len() && tested > 0 { "test" } else { "fit" };
+    for ((name, trial), is_tested) in trials.iter().zip(is_tested) {
+        let split = if is_tested { "test" } else { "fit" };
         let rate =
             trial.rate_hz().map_or(String::new(), |hz| format!(", {hz:.4} samples a second"));
         out +=
@@ -321,6 +335,19 @@ mod tests {
 
     fn column(name: &str, is_held: bool) -> Known {
         Known { name: name.into(), range: [0.0, 1.0], is_called: is_called(name), is_held }
+    }
+
+    #[test]
+    fn the_shorter_of_two_recordings_is_the_test() {
+        let trial = |seconds: f64| {
+            let trial =
+                Trial { name: String::new(), time_s: vec![0.0, seconds], channels: Vec::new() };
+            (String::new(), trial)
+        };
+        assert_eq!(is_tested(&[trial(5.0), trial(9.0)]), [true, false]);
+        assert_eq!(is_tested(&[5.0; 2].map(trial)), [false, true]);
+        assert_eq!(is_tested(&[5.0; 5].map(trial)), [false, false, false, true, true]);
+        assert_eq!(is_tested(&[trial(5.0)]), [false]);
     }
 
     #[test]
@@ -362,6 +389,13 @@ mod tests {
         let measured = of(&[column("torque_nm", false), column("angle_rad", false)]);
         assert!(measured.contains("inputs = [\"torque_nm\"]"), "{measured}");
         assert!(measured.contains("\nposition = \"angle_rad\"  #"), "{measured}");
+        // A sensor log with one other column, which is an input; an estimate is none.
+        let log =
+            of(&[column("gauge_mv", false), column("load_g", false), column("estimate_g", false)]);
+        assert!(
+            log.contains("output = \"load_g\"\n") && log.contains("inputs = [\"gauge_mv\"]"),
+            "{log}"
+        );
         let none = of(&[column("target_deg", false), column("goal_deg", true)]);
         assert!(!none.contains("\noutput =") && none.contains("No output is proposed"), "{none}");
     }

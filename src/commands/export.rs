@@ -7,6 +7,7 @@ use std::{
 };
 
 use anyhow::{Context, anyhow, bail, ensure};
+use clap::ArgGroup;
 use stretch_calibrate::{FIXED_STEP, FixedRecord, fixed_record, parse_adc};
 use stretch_data::files::{FileError, Outputs, is_standard_output, write_whole};
 use stretch_export::{
@@ -42,7 +43,7 @@ use crate::display::warn;
 ///   stretch export --calibration cal.json
 ///   stretch export --calibration cal.json --seal
 #[derive(clap::Args)]
-#[command(verbatim_doc_comment)]
+#[command(verbatim_doc_comment, group(ArgGroup::new("written").args(["c", "fixed"]).multiple(true)))]
 pub(crate) struct Args {
     /// Calibration file from `stretch calibrate`
     #[arg(long, value_name = "cal.json")]
@@ -74,7 +75,7 @@ pub(crate) struct Args {
     ///
     /// ZERO and FULL_SCALE are in the unit of the signal column: volts such as 12,0,3.3, or counts such
     /// as 10,0,1023 for a column of codes.
-    #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO,FULL_SCALE",
+    #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO,FULL_SCALE", requires = "written",
           value_parser = parse_adc)]
     adc: Adc,
     /// Check the file and renew its seal, after a hand edit or from an earlier release

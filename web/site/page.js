@@ -99,7 +99,7 @@ const page = {
   /** Which columns are reference and signal: what was chosen before, the usual names, units. @param {About[]} all */
   guess(all) {
     const columns = [...new Map(all.flatMap((a) => a.columns).map((c) => [c.name, c])).values()];
-    const free = columns.filter((c) => !COMMANDS.includes(c.name));
+    const free = columns.filter((c) => !COMMANDS.includes(c.name) && !c.name.startsWith("estimate"));
     const by = (/** @type {string[]} */ units, /** @type {RegExp} */ name) =>
       free.find((c) => units.includes(c.unit.toLowerCase())) ?? free.find((c) => name.test(c.name.toLowerCase()));
     const usual = (/** @type {string} */ name) => free.find((c) => c.name === name);

@@ -253,7 +253,7 @@ const live = async () => {
   await until(page, () => / mm$/.test(document.getElementById("length").textContent));
   check(await page.locator("#live-doubts li").count() === 0, "nothing makes one doubt them");
   const numbers = await saved(page, "save-trial");
-  check(numbers.text.split("\n").length === 502 && numbers.text.startsWith("time_s,bridge_v,reference,estimate_mm\n0,1.5,,\n"), "numbers are recorded");
+  check(numbers.text.split("\n").length === 502 && numbers.text.startsWith("time_s,bridge_v,length_mm,estimate_mm\n0,1.5,,\n"), "numbers are recorded");
   check(await page.locator("#trace").evaluate((c) => new Set(c.getContext("2d").getImageData(0, 0, c.width, c.height).data).size > 4), "and drawn");
   const disconnect = async () => {
     await page.evaluate(() => { window.testPort.close(); window.testPort.push = null; });

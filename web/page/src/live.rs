@@ -26,6 +26,8 @@ const LONGEST: usize = 256;
 pub struct Live {
     source: Source,
     signal: String,
+    /// Column of the reference; `reference` without a calibration.
+    reference: String,
     unit: String,
     /// Lines of the recording since the last call of `Live::lines`.
     lines: String,
@@ -65,7 +67,9 @@ impl Live {
         let signal =
             calibration.as_ref().map_or("bridge_v", |c| c.spec().signal.as_str()).to_owned();
         let unit = calibration.as_ref().map_or("", |c| c.spec().reference.unit()).to_owned();
-        Self { source, signal, unit, lines: String::new() }
+        let reference = calibration.as_ref().map_or("reference", |c| c.spec().reference.as_str());
+        let reference = reference.to_owned();
+        Self { source, signal, reference, unit, lines: String::new() }
     }
 
     /// Takes the bytes received at a time of the browser's clock. Returns a flat list of time,
@@ -96,7 +100,9 @@ impl Live {
             Source::Frames(_) => {
                 format!("time_s,{},adc_code,estimate{unit},branch,domain\n", self.signal)
             }
-            Source::Numbers(_) => format!("time_s,{},reference,estimate{unit}\n", self.signal),
+            Source::Numbers(_) => {
+                format!("time_s,{},{},estimate{unit}\n", self.signal, self.reference)
+            }
         }
     }
 
@@ -105,7 +111,13 @@ impl Live {
         match &self.source {
             Source::Frames(frames) => frames.status(&self.unit),
             Source::Numbers(numbers) => {
-                format!("{} lines, {} without numbers", numbers.lines, numbers.damaged)
+                let advice = match &numbers.first_damaged {
+                    Some(line) if numbers.samples == 0 => format!(
+                        " (the first is \"{line}\"): send lines of numbers: a signal; time and signal; or time, reference and signal"
+                    ),
+                    _ => String::new(),
+                };
+                format!("{} lines, {} without numbers{advice}", numbers.lines, numbers.damaged)
             }
         }
     }
@@ -260,6 +272,8 @@ struct Numbers {
     rate_hz: f64,
     lines: u64,
     damaged: u64,
+    /// The first line without numbers.
+    first_damaged: Option<String>,
     samples: u64,
     applied: Option<Applied>,
 }
@@ -296,6 +310,7 @@ impl Numbers {
             rate_hz,
             lines: 0,
             damaged: 0,
+            first_damaged: None,
             samples: 0,
             applied: calibration.map(Applied::new).transpose()?,
         })
@@ -311,7 +326,13 @@ impl Numbers {
         let line = std::mem::take(&mut self.line);
         self.lines += 1;
         let Some((time_s, reference, signal)) = self.parse(&line) else {
-            self.damaged += u64::from(!line.trim_ascii().is_empty());
+            let text = line.trim_ascii();
+            if !text.is_empty() {
+                self.damaged += 1;
+                self.first_damaged.get_or_insert_with(|| {
+                    String::from_utf8_lossy(text).chars().take(40).collect()
+                });
+            }
             return None;
         };
         self.samples += 1;

@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use crate::support::{Scratch, calibrate, program, stdout, stretch};
+use crate::support::{Scratch, calibrate, one_line, program, runs, stdout, stretch};
 use serde_json::Value;
 
 #[test]
@@ -108,6 +108,11 @@ fn other_columns_and_units() {
         .unwrap();
     let summary: Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(summary["signal"], "s2", "the other is noise");
+    let mut worse = calibrate(&trial, &scratch.path("worse.json"));
+    worse.args(["--time", "t_ms", "--reference", "angle_deg", "--signal", "auto:s2,s1"]);
+    let said = one_line(&runs(worse.args(["--model", "poly10", "--force"])));
+    assert!(said.contains("note: poly10 is worse than a straight line"), "{said}");
+    assert!(said.contains("RMSE of the signals, % of range: s"), "{said}");
     let output = stretch()
         .args(["apply", "--time", "t_ms", "--calibration"])
         .arg(&record)

@@ -173,6 +173,14 @@ fn quiet_says_results_and_errors_and_verbose_says_how() {
     assert!(usual.starts_with(&quiet) && usual.contains("Bias, mm"), "{usual}");
     assert!(all.starts_with(&quiet) && all.contains("paired t test"), "{all}");
     assert!(!usual.contains("paired t test") && usual.lines().count() <= 17, "{usual}");
+    let mut many = stretch();
+    many.arg("evaluate");
+    (0..10).for_each(|_| {
+        many.arg("--calibration").arg(scratch.path("cal.json"));
+    });
+    let many = prints(many.arg(&trial));
+    assert!(many.starts_with("cal, the best of 10, is off by"), "{many}");
+    assert!(many.contains("the best 8 of 10 calibrations"), "{many}");
     assert_eq!(nothing, "");
     for part in [" s] read a.csv: 2000 samples", " s] fitted poly13 to length_mm", " s] the end"] {
         assert!(verbose.contains(part), "{part}: {verbose}");

@@ -26,11 +26,12 @@ use stretch_sleeve::{calibrate_gauge, missing_turns};
 
 use super::{
     calibrate_sleeve,
-    calibration_text::{blocks_of_calibration, blocks_of_models},
+    calibration_text::{blocks_of_calibration, blocks_of_models, blocks_of_notes},
     json::Json,
     reading::{Recorded, columns, read_trials, with_columns_to_name},
     shared::{Completed, detail, of_files, say_below, say_first, spinner, stage_text},
 };
+use crate::table::number;
 
 /// Fit a calibration to logged trials
 ///
@@ -423,9 +424,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let mut calibrated = calibrate(&trials, &options).map_err(named)?;
     detail(format!("fitted {} to {} on {}", options.model, options.reference, options.signal));
     let candidates: Vec<String> = ranking.iter().map(|signal| signal.signal.clone()).collect();
-    calibrated
-        .notes
-        .splice(0..0, gross_errors.into_iter().chain(copied_signals(&trials, &candidates)));
+    let line =
+        choice.is_none().then(|| worse_than_a_line(&calibrated, &trials, &options)).flatten();
+    let first = line.into_iter().chain(gross_errors).chain(copied_signals(&trials, &candidates));
+    let first: Vec<String> = first.collect();
+    let doubts = first.len();
+    calibrated.notes.splice(0..0, first);
     accept(&mut calibrated, &args)?;
     calibrated.notes.extend(causes.notes);
     calibrated.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
@@ -450,16 +454,28 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         "notes": calibrated.notes,
     });
     args.json.conclude(outputs, &answer, || {
-        let Some(choice) = &choice else {
-            say_first(judged)?;
-            return say_below(blocks_of_calibration(&calibrated, &ranking, false), args.written());
+        let (doubts, notes) = calibrated.notes.split_at(doubts);
+        let models = choice.as_ref().map(|choice| blocks_of_models(choice, &options.reference));
+        let (sentence, tested) = match &choice {
+            None => (judged, None),
+            Some(choice) => (chosen(choice, &ranking), (!test.is_empty()).then_some(judged)),
         };
-        say_first(format!("Chosen: {}.", choice.why))?;
-        let tested = (!test.is_empty()).then_some(judged);
-        let models = blocks_of_models(choice, &options.reference);
-        let others = blocks_of_calibration(&calibrated, &ranking, true);
-        say_below(tested.into_iter().chain(models).chain(others), args.written())
+        say_first(sentence)?;
+        let fits = blocks_of_calibration(&calibrated, &ranking, choice.is_some());
+        let tables = tested.into_iter().chain(models.into_iter().flatten()).chain(fits);
+        say_below(
+            blocks_of_notes(doubts).chain(tables).chain(blocks_of_notes(notes)),
+            args.written(),
+        )
     })
+}
+
+/// Returns the sentence with the chosen model, and the signal if that was chosen as well.
+fn chosen(choice: &ModelChoice, ranking: &[Candidate]) -> String {
+    let signal = ranking.first().map_or(String::new(), |best| {
+        format!("signal {}, the best of {}; ", best.signal, ranking.len())
+    });
+    format!("Chosen: {signal}{}.", choice.why)
 }
 
 /// Ranks the signals of `--signal auto`, and returns none for any other signal.
@@ -508,6 +524,30 @@ fn choose(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateE
     choice
 }
 
+/// Ratio of the error of a model to that of a straight line from which a note is given.
+const WORSE: f64 = 1.05;
+
+/// Returns a note if a straight line through the fitted trials has a smaller error than the calibration.
+fn worse_than_a_line(
+    calibrated: &Calibrated,
+    trials: &[Trial],
+    options: &Options,
+) -> Option<String> {
+    let line = Options { model: ModelKind::Linear, ..options.clone() };
+    let line = (options.model != ModelKind::Linear).then(|| calibrate(trials, &line).ok())??;
+    let both = [("chosen", &calibrated.calibration), ("linear", &line.calibration)];
+    let evaluation = evaluate_errors(&both, trials).ok()?;
+    let [_, own, line] = &evaluation.pooled[..] else { return None };
+    (own.rmse > WORSE * line.rmse).then(|| {
+        let unit = &evaluation.unit;
+        let numbers = [own.rmse, line.rmse].map(|rmse| format!("{} {unit}", number(rmse)).trim_end().to_owned());
+        format!(
+            "{} is worse than a straight line on the trials of the fit (RMSE {}, linear {}): use --model auto",
+            options.model, numbers[0], numbers[1]
+        )
+    })
+}
+
 /// Evaluates a calibration on the test trials, or on the fitted trials if there are none. Adds the report to the
 /// outputs, if there is one, and returns the sentence with the error.
 fn judge(
@@ -553,13 +593,16 @@ fn verdict(
     })
 }
 
-/// Returns the columns of the first trial, except those in `but`.
+/// Returns the columns of the first trial, except those in `but` and the estimates of `stretch listen` or of the live
+/// page.
 ///
 /// # Errors
 /// There is no other column.
 pub(super) fn other_columns(trials: &[Trial], but: &[String]) -> anyhow::Result<Vec<String>> {
     let channels = trials.first().into_iter().flat_map(|trial| &trial.channels);
-    let names = channels.map(|channel| channel.name.clone()).filter(|name| !but.contains(name));
+    let names = channels
+        .map(|channel| channel.name.clone())
+        .filter(|name| !but.contains(name) && !name.starts_with("estimate"));
     let names: Vec<String> = names.collect();
     ensure!(
         !names.is_empty(),

@@ -16,8 +16,8 @@ const SQUARED_EXCESS: &str = "MSE above best";
 /// Headings of the columns for single kinds of trial.
 const KINDS: [&str; 3] = ["arbitrary", "pulses", "ramps"];
 
-/// Number of models, or of signals, that are shown without `-v`.
-const SHOWN: usize = 4;
+/// Number of models that are shown without `-v`.
+const SHOWN: usize = 8;
 
 /// Returns the models that `auto` compared as a table, with the chosen model first, and which of them
 /// exports to C. Without `-v`, only the best models are shown.
@@ -35,7 +35,8 @@ pub(super) fn blocks_of_models(choice: &ModelChoice, reference: &str) -> Vec<Str
     };
     let mut blocks: Vec<String> = on_this_computer(choice, reference).into_iter().collect();
     blocks.push(format!(
-        "RMSE{unit} on trials left out of the fit (* chosen{count}):\n{}",
+        "RMSE{unit} on {} left out of the fit (* chosen{count}):\n{}",
+        choice.left_out,
         table_of_models(&shown, &chosen)
     ));
     if is_verbose() {
@@ -53,6 +54,9 @@ pub(super) fn blocks_of_models(choice: &ModelChoice, reference: &str) -> Vec<Str
     }
     blocks
 }
+
+/// Number of signals that are listed without `-v`.
+const MOST_SIGNALS: usize = 12;
 
 /// Whether `stretch export --c` writes a model.
 fn exports_to_c(model: &str) -> bool {
@@ -135,7 +139,25 @@ fn instructions(row: &ModelRow) -> String {
     }
 }
 
-/// Returns the tables and notes of a calibration, with the quality of each fit unless its model was
+/// Formats candidate signals in one line, best first.
+fn line_of_signals(ranking: &[Candidate]) -> String {
+    let (shown, others) = ranking.split_at(ranking.len().min(MOST_SIGNALS));
+    let one = |c: &Candidate| {
+        let error = c.cross_validated_rmse.map(|rmse| number(100.0 * rmse));
+        format!("{} {}", c.signal, error.unwrap_or_else(|| "not fitted".to_owned()))
+    };
+    let shown: Vec<String> = shown.iter().map(one).collect();
+    let more =
+        if others.is_empty() { String::new() } else { format!(", and {} more", others.len()) };
+    format!("Cross-validated RMSE of the signals, % of range: {}{more}.", shown.join(", "))
+}
+
+/// Returns notes as paragraphs.
+pub(super) fn blocks_of_notes(notes: &[String]) -> impl Iterator<Item = String> {
+    notes.iter().map(|note| format!("note: {note}"))
+}
+
+/// Returns the tables of a calibration, with the quality of each fit unless its model was
 /// `chosen` from a table. With `-v`, they contain everything that the paper of the published method
 /// lists.
 pub(super) fn blocks_of_calibration(
@@ -144,15 +166,15 @@ pub(super) fn blocks_of_calibration(
     chosen: bool,
 ) -> Vec<String> {
     let mut blocks = Vec::new();
-    if !ranking.is_empty() {
-        let most = if is_verbose() { ranking.len() } else { SHOWN.min(ranking.len()) };
-        blocks.push(table_text(&signal_table(&ranking[..most])));
+    match ranking {
+        [] => {}
+        _ if is_verbose() => blocks.push(table_text(&signal_table(ranking))),
+        _ => blocks.push(line_of_signals(ranking)),
     }
     blocks.extend((!chosen || is_verbose()).then(|| table_of_fits(calibrated)));
     if is_verbose() {
         blocks.extend(coefficients(calibrated));
     }
-    blocks.extend(calibrated.notes.iter().map(|note| format!("note: {note}")));
     blocks
 }
 

@@ -20,7 +20,7 @@ use stretch_sim::{ActiveEffect, RunSettings, TrialPlan, demo_preset, effect_name
 
 use super::{
     apply::write_all,
-    calibration_text::{blocks_of_calibration, blocks_of_models},
+    calibration_text::{blocks_of_calibration, blocks_of_models, blocks_of_notes},
     diagnose::{print as print_diagnosis, told_on},
     evaluate::table_of_errors,
     json::Json,
@@ -306,6 +306,7 @@ fn print(sessions: &Sessions, job: &Job, result: &str) -> anyhow::Result<()> {
     if is_verbose() {
         say(format!("\nThe paper's calibrations, on {}:", trials(sessions.ramps().len())))?;
         blocks_of_calibration(surfaces, &job.ranking, false).into_iter().try_for_each(say)?;
+        blocks_of_notes(&surfaces.notes).try_for_each(say)?;
         say(format!("\nChosen by cross-validation on {}:", trials(sessions.fit.len())))?;
         say(format!("Chosen: {}.", choice.why))?;
         blocks_of_models(choice, &sessions.reference).into_iter().try_for_each(say)?;

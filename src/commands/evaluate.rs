@@ -153,14 +153,18 @@ pub(super) fn table_of_errors(title: &str, methods: &[MethodErrors], unit: &str)
     table_text(&method_table(title, methods, &names, unit))
 }
 
-/// Largest number of methods that are shown without `-v`.
-const MOST_SHOWN: usize = 7;
+/// Largest number of methods, with the raw signal, that are shown without `-v`.
+const MOST_SHOWN: usize = 9;
 
 /// Prints the error of the best of the first `compared` methods as a sentence, and the table of all trials. With `-v`,
 /// also prints a table for each trial, and tests whether the methods differ.
 fn print(evaluation: &Evaluation, compared: usize) -> anyhow::Result<()> {
     let Evaluation { unit, trials, pooled, comparisons } = evaluation;
-    let name = |i: usize| pooled[i].method.clone();
+    let count = compared.saturating_sub(1);
+    let name = |i: usize| match (count, &pooled[i].method) {
+        (0 | 1, method) => method.clone(),
+        (count, method) => format!("{method}, the best of {count},"),
+    };
     if let Some(errors) = errors_in_words(&pooled[..compared], unit, name) {
         say_first(errors)?;
     }
@@ -173,16 +177,21 @@ fn print(evaluation: &Evaluation, compared: usize) -> anyhow::Result<()> {
         [one] => one.trial.as_str(),
         _ => "All trials",
     };
-    let shown = if is_verbose() { pooled.len() } else { pooled.len().min(MOST_SHOWN) };
-    blocks.push(table_of_errors(title, &pooled[..shown], unit));
-    if shown < pooled.len() {
-        blocks.push(format!("{} more with -v", pooled.len() - shown));
+    let mut shown = pooled.clone();
+    if !is_verbose() && pooled.len() > MOST_SHOWN {
+        // The raw signal stays first, and the gauges of a sleeve last.
+        shown[1..compared].sort_by(|a, b| a.rmse.total_cmp(&b.rmse));
+        shown.truncate(MOST_SHOWN);
+    }
+    blocks.push(table_of_errors(title, &shown, unit));
+    if shown.len() < pooled.len() {
+        blocks.push(format!("{} more with -v", pooled.len() - shown.len()));
     }
     if is_verbose() {
         blocks.push(
             "Average error: mean |reference - estimate| over the range of the estimate, as in the paper. Bias: mean of estimate minus \
-             reference. Lag: positive if the estimate is late. Outside domain: samples whose signal or rate of change was clamped to the \
-             calibrated range."
+             reference. Lag: positive if the estimate is late. Outside domain: samples whose signal was outside the range of the \
+             fitted trials, or whose rate of change was clamped."
                 .to_owned(),
         );
         if !comparisons.is_empty() {

@@ -14,6 +14,8 @@ fn what_cannot_be_read_or_written_is_named_and_nothing_is_written() {
     scratch.write("newer.json", good.replace("\"schema\": 2", "\"schema\": 7"));
     scratch.write("half.json", &good[..good.len() / 2]);
     scratch.write("text.json", "not json");
+    scratch.write("sim.toml", "[gauge]\ngain = 2\n");
+    scratch.write("d.json", "{\"verdict\": \"effect\", \"sentence\": \"none\"}");
     scratch.write("null.json", format!("{}null{}", &good[..at], &good[end..]));
     scratch.write("below.json", format!("{}-3.0{}", &good[..at], &good[end..]));
     scratch.write("other.csv", "time_s,s1\n0,1\n0.01,2\n");
@@ -34,7 +36,19 @@ fn what_cannot_be_read_or_written_is_named_and_nothing_is_written() {
         ("calibrate a.csv --out folder", &["folder"]),
         ("apply --calibration newer.json a.csv", &["newer.json", "schema is 7", "update"]),
         ("apply --calibration half.json a.csv", &["half.json", "EOF"]),
-        ("apply --calibration text.json a.csv", &["text.json", "line 1"]),
+        ("apply --calibration text.json a.csv", &["text.json", "a text file"]),
+        ("apply --calibration a.csv a.csv", &["a.csv: this is a text file, such as a recording"]),
+        ("evaluate --calibration a.csv a.csv", &["recording (CSV), and not a calibration"]),
+        ("export --calibration a.csv", &["recording (CSV), and not a calibration"]),
+        ("export --calibration sim.toml --c made", &["sim.toml: this is a TOML file"]),
+        (
+            "apply --calibration d.json a.csv",
+            &["d.json: this is a diagnosis and not a calibration"],
+        ),
+        (
+            "calibrate other.csv --reference s1 --signal s1 --out new.json",
+            &["s1 is both the signal and the reference"],
+        ),
         ("apply --calibration null.json a.csv", &["null.json", "dead_band"]),
         ("apply --calibration below.json a.csv", &["below.json", "dead_band", "-3"]),
         ("apply --calibration cal.json other.csv", &["other.csv", "bridge_v", "s1"]),
@@ -43,6 +57,7 @@ fn what_cannot_be_read_or_written_is_named_and_nothing_is_written() {
     }
     for (option, hint) in [
         ("--model poly77", "poly55"),
+        ("--model cubic", "use poly03"),
         ("--rate savgol:11", "savgol:WINDOW,DEGREE"),
         ("--robust both", "bisquare"),
     ] {
@@ -51,6 +66,9 @@ fn what_cannot_be_read_or_written_is_named_and_nothing_is_written() {
         let message = String::from_utf8_lossy(&output.stderr);
         assert!(message.contains(hint), "{message}");
     }
+    let output = run("export --calibration cal.json --adc 10,0,5").output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && message.contains("--c <DIR>"), "{message}");
     assert_eq!(scratch.names(), before);
 }
 
@@ -64,8 +82,11 @@ fn crlf_bom_and_semicolons_are_understood() {
     let german = text.replace(',', ";").replace('.', ",").replace("bridge_v", "Bridge (V)");
     let german = scratch.write("german.csv", german.replace("time_s", "Zeit [s]"));
     for (trial, out) in [(&plain, "a.json"), (&foreign, "b.json"), (&german, "c.json")] {
-        calibrate(trial, &scratch.path(out)).assert().success();
+        calibrate(trial, &scratch.path(out)).assert().success().stderr("");
     }
+    let mut verbose = calibrate(&german, &scratch.path("c.json"));
+    let output = verbose.arg("-v").output().unwrap();
+    assert!(String::from_utf8_lossy(&output.stderr).contains("numbers have decimal commas"));
     let read = |name| std::fs::read_to_string(scratch.path(name)).unwrap();
     // The checksum covers the trial's name, too.
     let unsealed = |name| read(name).split("\"digest\"").next().unwrap().to_owned();

@@ -16,11 +16,11 @@ pub enum CalibrateError {
     NoTrials,
     /// No model can be evaluated on samples that were left out of its fit.
     #[error(
-        "there are too few samples to leave some out of the fit, so that the models cannot be compared; record more, or choose one model with --model"
+        "there are too few samples to leave some out of the fit, so that the models cannot be compared; record a minute of motion, or choose one model with --model"
     )]
     TooFewToJudge,
     /// The trial has too few samples.
-    #[error("{trial}: {samples} samples are too few to calibrate on; record more")]
+    #[error("{trial}: {samples} samples are too few to calibrate on; record a minute of motion")]
     TooShort {
         /// The trial.
         trial: String,
@@ -51,6 +51,14 @@ pub enum CalibrateError {
         column: String,
         /// The constant value.
         value: f64,
+    },
+    /// Signal and reference are the same column.
+    #[error(
+        "{column} is both the signal and the reference, but a calibration needs two columns: record a reference in the same file, such as length_mm, and name both columns"
+    )]
+    SameColumn {
+        /// The column.
+        column: String,
     },
     /// One of the two branches (directions of motion) has too few samples.
     #[error(

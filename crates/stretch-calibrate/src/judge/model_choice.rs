@@ -65,6 +65,9 @@ pub struct ModelChoice {
     /// The model to use.
     #[serde(skip)]
     pub model: ModelKind,
+    /// What was left out of each fit: `trials`, `parts of the trials` or `rows`.
+    #[serde(skip)]
+    pub left_out: &'static str,
     /// Explanation of the choice, with the figures that were compared.
     pub why: String,
     /// Questions that the data cannot answer, one sentence each.
@@ -210,7 +213,13 @@ pub fn choose_among(
         (0..found.len()).map(|i| row(&found[i], excess_over(i, best))).collect();
     let key = |r: &ModelRow| r.rmse.unwrap_or(f64::INFINITY);
     rows.sort_by(|a, b| key(a).total_cmp(&key(b)));
-    Some(ModelChoice { rows, model, why, notes: notes(trials, options, memory_shows) })
+    let left_out = match trials.len() {
+        _ if options.is_table => "rows",
+        few if few < LEAST_TRIALS => "parts of the trials",
+        _ => "trials",
+    };
+    let notes = notes(trials, options, memory_shows);
+    Some(ModelChoice { rows, model, left_out, why, notes })
 }
 
 /// A candidate, and its errors on data left out of its fit.

@@ -52,6 +52,9 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     pub(crate) fn new(trials: &[Trial], options: &Options) -> Result<Self, CalibrateError> {
+        if options.signal == options.reference {
+            return Err(CalibrateError::SameColumn { column: options.signal.clone() });
+        }
         let (sample_rate, Evened { pieces, rows, mut notes, .. }) = Evened::of(trials, options)?;
         notes.extend(rows.note());
         let names: Vec<&str> = trials.iter().map(|trial| trial.name.as_str()).collect();

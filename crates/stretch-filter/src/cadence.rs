@@ -6,7 +6,15 @@ use stretch_core::{Design, DesignError, SampleRate, Seconds, Stage};
 /// Classifies the time stamps of a live stream by its sample rate.
 ///
 /// Every estimator of this crate assumes one sample per period. Step the cadence with each time
-/// stamp and reset the estimator after an [`Arrival::Gap`] or an [`Arrival::Backwards`].
+/// stamp, and reset an estimator of this crate after an [`Arrival::Gap`] or an
+/// [`Arrival::Backwards`]. A receptor of `stretch-receptor` bridges a short gap itself: give it as
+/// many missing samples as the gap has, and reset it only after an [`Arrival::Backwards`].
+///
+/// Missing samples are counted on a grid of periods and not by single intervals, so a late sample
+/// before an early one is no gap. The grid passes through the earliest stamps. A stamp that is later
+/// than the grid by less than 0.9 periods follows the stamp before it, so jitter of up to 0.45
+/// periods to both sides makes no gap. The grid moves by up to a hundredth of a period per sample,
+/// so a clock that is slower by up to 1% makes no gap either.
 ///
 /// ```
 /// use stretch_core::{Runner, SampleRate, Seconds};
@@ -16,9 +24,10 @@ use stretch_core::{Design, DesignError, SampleRate, Seconds, Stage};
 /// let mut cadence = Runner::new(Cadence::new(rate, 0.2).unwrap());
 /// assert_eq!(cadence.step(Seconds(0.00)), Arrival::First);
 /// assert_eq!(cadence.step(Seconds(0.01)), Arrival::OnTime);
-/// assert!(matches!(cadence.step(Seconds(0.024)), Arrival::Jitter { .. }));
-/// assert_eq!(cadence.step(Seconds(0.054)), Arrival::Gap { missing: 2 });
-/// assert!(matches!(cadence.step(Seconds(0.054)), Arrival::Backwards { .. }));
+/// assert!(matches!(cadence.step(Seconds(0.028)), Arrival::Jitter { .. })); // late
+/// assert!(matches!(cadence.step(Seconds(0.030)), Arrival::Jitter { .. })); // early
+/// assert_eq!(cadence.step(Seconds(0.060)), Arrival::Gap { missing: 2 });
+/// assert!(matches!(cadence.step(Seconds(0.060)), Arrival::Backwards { .. }));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cadence {
@@ -26,11 +35,19 @@ pub struct Cadence {
     tolerance: f64,
 }
 
-/// State of a [`Cadence`]: the last finite time stamp.
+/// State of a [`Cadence`]: the last finite time stamp, and its place on the grid.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CadenceMemory {
     last_s: Option<f64>,
+    /// The time at which the last sample was due if it had been as early as the earliest.
+    due_s: f64,
 }
+
+/// Lateness against the grid, in periods, from which on a sample is missing.
+const LATEST: f64 = 0.9;
+
+/// Largest movement of the grid to a later time, in periods per sample.
+const DRIFT: f64 = 0.01;
 
 /// Relation of a time stamp to the one before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +63,7 @@ pub enum Arrival {
         /// Lateness in seconds; negative if early.
         late_s: f64,
     },
-    /// Samples are missing: the interval is nearest to `missing + 1` periods.
+    /// Samples are missing between the stamp and the one before it, counted on the grid.
     Gap {
         /// Number of missing samples, saturating.
         missing: u32,
@@ -94,20 +111,29 @@ impl Stage<Seconds> for Cadence {
         if !time_s.is_finite() {
             return Arrival::NotFinite;
         }
-        let Some(last_s) = memory.last_s.replace(time_s) else { return Arrival::First };
-        let elapsed_s = time_s - last_s;
+        let Some(last_s) = memory.last_s.replace(time_s) else {
+            memory.due_s = time_s;
+            return Arrival::First;
+        };
+        let (elapsed_s, period_s) = (time_s - last_s, self.sample_rate.period_s());
         if elapsed_s <= 0.0 {
+            memory.due_s = time_s;
             return Arrival::Backwards { by_s: -elapsed_s };
         }
-        let periods = elapsed_s * self.sample_rate.hz();
-        if periods >= 1.5 {
-            // A saturating cast; adding a half rounds to the nearest count.
-            return Arrival::Gap { missing: (periods + 0.5) as u32 - 1 };
+        // A saturating cast, which rounds down.
+        let late = (time_s - memory.due_s) * self.sample_rate.hz() - 1.0;
+        let missing = (late + (1.0 - LATEST)) as u32;
+        memory.due_s += (1.0 + f64::from(missing) + DRIFT) * period_s;
+        // The grid starts again at an early sample, and after more samples than can be counted.
+        if memory.due_s > time_s || missing == u32::MAX {
+            memory.due_s = time_s;
         }
-        if (periods - 1.0).abs() <= self.tolerance {
+        if missing > 0 {
+            Arrival::Gap { missing }
+        } else if (elapsed_s * self.sample_rate.hz() - 1.0).abs() <= self.tolerance {
             Arrival::OnTime
         } else {
-            Arrival::Jitter { late_s: elapsed_s - self.sample_rate.period_s() }
+            Arrival::Jitter { late_s: elapsed_s - period_s }
         }
     }
 }

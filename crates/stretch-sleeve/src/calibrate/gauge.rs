@@ -1,8 +1,9 @@
 //! Applies a calibration of one gauge to time-stamped samples, live or from a file, and watches the gauge's zero.
 
 use stretch_calibrate::{Applied, CalibrateError, Faults, LiveReceptor, apply, pressure_column};
-use stretch_core::{Design, RateEstimator};
+use stretch_core::{Design, RateEstimator, Runner, Seconds};
 use stretch_data::Trial;
+use stretch_filter::{Arrival, Cadence};
 use stretch_receptor::{Reading, Withheld};
 
 use crate::{GaugeCalibration, Zero, ZeroMemory, ZeroWatch};
@@ -16,8 +17,7 @@ pub struct LiveGauge {
     receptor: LiveReceptor,
     watch: Option<(ZeroWatch<f64>, ZeroMemory<f64>)>,
     zero: Option<Zero<f64>>,
-    last_s: Option<f64>,
-    period_s: f64,
+    cadence: Runner<Cadence>,
 }
 
 impl LiveGauge {
@@ -32,8 +32,8 @@ impl LiveGauge {
             (watch, watch.memory())
         });
         let receptor = LiveReceptor::new(gauge.calibration())?;
-        let period_s = spec.sample_rate_hz.period_s();
-        Ok(Self { receptor, watch, zero: None, last_s: None, period_s })
+        let cadence = Runner::new(Cadence::new(spec.sample_rate_hz, 0.5)?);
+        Ok(Self { receptor, watch, zero: None, cadence })
     }
 
     /// Returns the same receptor, which also follows a slow drift of the signal's zero and subtracts it from the
@@ -62,20 +62,16 @@ impl LiveGauge {
     /// # Errors
     /// [`Withheld`] if there is no reading for the sample.
     pub fn step(&mut self, time_s: f64, signal: f64) -> Result<Reading, Withheld> {
-        let mut periods = 1.0;
-        if time_s.is_finite()
-            && let Some(last_s) = self.last_s.replace(time_s)
-        {
-            periods = ((time_s - last_s) / self.period_s).round();
-            if time_s <= last_s {
-                // Restart the watch if a stamp repeats or goes back, as the receptor does.
-                self.watch = self.watch.map(|(watch, _)| (watch, watch.memory()));
-            }
-        }
+        let arrival = self.cadence.step(Seconds(time_s));
         let mut corrected = signal;
         if let Some((watch, memory)) = &mut self.watch {
-            // The samples that are missing before this one count as time.
-            watch.lose(memory, (periods - 1.0) as u32);
+            match arrival {
+                // The samples that are missing before this one count as time.
+                Arrival::Gap { missing } => watch.lose(memory, missing),
+                // Restart the watch if a stamp repeats or goes back, as the receptor does.
+                Arrival::Backwards { .. } => *memory = watch.memory(),
+                _ => {}
+            }
             self.zero = watch.step(memory, signal);
             corrected = watch.corrected(memory, signal);
         }

@@ -137,7 +137,7 @@ pub enum CalibrateError {
     #[error(transparent)]
     Receptor(#[from] ReceptorError),
     /// A number is outside its valid range.
-    #[error("the calibration is not possible: {0}")]
+    #[error("the calibration is not possible: {}", in_words(.0))]
     Design(#[from] DesignError),
     /// The model has no integer form.
     #[error(
@@ -179,12 +179,25 @@ pub enum CalibrateError {
         /// Error of the fit, in the unit of the reference.
         error: f64,
     },
-    /// All of the signal lies outside the converter's range.
+    /// Thousandths of the reference's unit exceed 32 bits.
     #[error(
-        "the signal {signal} of the trials is between {} and {}, but the converter measures from {zero_v} to {full_scale_v}: this is not \
+        "in integers the estimate of {reference} is in thousandths of its unit, and {} of that unit do not fit 32 bits: convert \
+         {reference} to a larger unit, such as kN instead of N, and calibrate again",
+        four_digits(*.largest)
+    )]
+    FixedRange {
+        /// Column of the reference.
+        reference: Label,
+        /// The largest magnitude of the reference.
+        largest: f64,
+    },
+    /// All of the signal lies outside the converter's range, or within a few of its codes.
+    #[error(
+        "the signal {signal} of the trials is between {} and {}, but the converter measures from {zero_v} to {full_scale_v}{}: this is not \
          the board's converter; {GIVE_ADC}",
         four_digits(*.min),
-        four_digits(*.max)
+        four_digits(*.max),
+        if *.codes > 0.0 { format!(", in which the signal has only {codes:.1} codes") } else { String::new() }
     )]
     OutsideConverter {
         /// Column of the signal.
@@ -197,10 +210,13 @@ pub enum CalibrateError {
         zero_v: f64,
         /// The signal at the last code.
         full_scale_v: f64,
+        /// The number of codes between the least and the greatest signal; 0 if both lie outside.
+        codes: f64,
     },
     /// The numbers of the calibration do not fit integers with this converter.
     #[error(
-        "the calibration cannot be converted to integers for this converter: {0}; give the converter of the board with --adc"
+        "the calibration cannot be converted to integers for this converter: {}; give the converter of the board with --adc",
+        without_internal_names(.0)
     )]
     Fixed(#[source] ReceptorError),
     /// A calibration file does not load.
@@ -227,6 +243,30 @@ pub enum CalibrateError {
         /// Sample rate of the calibration, Hz.
         expected_hz: f64,
     },
+}
+
+/// Describes a fault that follows from the unit of the signal. Any other fault keeps its own text.
+fn in_words(error: &DesignError) -> String {
+    match error {
+        DesignError::OutOfRange { field: "step of observer.curve", value } => format!(
+            "the signal changes too little, by {value:e} of its unit between two points of its curve: convert it to a smaller unit, such as \
+             uA instead of A, and calibrate again"
+        ),
+        other => other.to_string(),
+    }
+}
+
+/// Describes why numbers do not fit integers, without the names of those numbers.
+fn without_internal_names(error: &ReceptorError) -> String {
+    match error {
+        ReceptorError::Calibration(
+            DesignError::OutOfRange { field, .. } | DesignError::TooLarge { field, .. },
+        ) if field.starts_with("fixed.") => {
+            "with its codes a number of the calibration is too large or too coarse for 32 bits"
+                .to_owned()
+        }
+        other => other.to_string(),
+    }
 }
 
 /// Largest relative difference between the median sample interval of a log and the sample interval of the calibration

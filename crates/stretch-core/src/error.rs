@@ -23,14 +23,15 @@ pub enum DesignError {
         /// Upper end.
         max: f64,
     },
-    /// A binary calibration file whose bytes do not match its checksum.
+    /// A binary calibration file whose bytes do not match its checksum: a byte has changed, or the given bytes are
+    /// longer or shorter than the file.
     Damaged {
         /// The checksum stored in the file.
         stored: u32,
         /// The checksum computed from its bytes.
         computed: u32,
     },
-    /// Bytes that are no record: erased memory, too few bytes, or too many.
+    /// Bytes that do not begin like a record, such as erased memory, or fewer bytes than a checksum has.
     NoRecord,
     /// A record with a valid checksum that holds another type than the requested one.
     OtherRecord,
@@ -84,7 +85,8 @@ impl fmt::Display for DesignError {
                 write!(f, "{field} is {value:e}, which is outside its allowed range")
             }
             Self::OutOfRange { field, value } => {
-                write!(f, "{field} is {value}, which is not finite or outside its allowed range")
+                let why = if value.is_finite() { "outside its allowed range" } else { "not finite" };
+                write!(f, "{field} is {value}, which is {why}")
             }
             Self::EmptyRange { field, min, max } => {
                 write!(
@@ -94,8 +96,8 @@ impl fmt::Display for DesignError {
             }
             Self::Damaged { stored, computed } => write!(
                 f,
-                "the calibration's seal is {stored:08x}, but its bytes give {computed:08x}: it was damaged or changed; copy \
-                 the original file again, or calibrate again"
+                "the calibration's checksum is {stored:08x}, but its bytes give {computed:08x}: it was damaged or changed, or bytes \
+                 were added or cut off; copy the original file again, or calibrate again"
             ),
             Self::NoRecord => {
                 write!(
@@ -105,7 +107,7 @@ impl fmt::Display for DesignError {
                 )
             }
             Self::OtherRecord => f.write_str(
-                "the seal is valid, but the bytes hold another type, or one of an earlier release: load the type that was stored, with its \
+                "the checksum is valid, but the bytes hold another type, or one of an earlier release: load the type that was stored, with its \
                  window and degree (stretch export --fixed prints the type), or calibrate again",
             ),
             Self::Schema { found: 3, .. } => write!(

@@ -55,6 +55,7 @@ pub struct FixedRecord {
 /// model, [`CalibrateError::FixedRate`] for a rate estimator for which no type was compiled (an observer needs none),
 /// [`CalibrateError::OutsideConverter`] if all of the trials' signal lies outside the converter,
 /// [`CalibrateError::FixedStep`] if a step of an estimate ([`FIXED_STEP`]) exceeds the fit's error,
+/// [`CalibrateError::FixedRange`] if the reference in such steps exceeds 32 bits,
 /// [`CalibrateError::Fixed`] if a number does not fit its format.
 ///
 /// ```
@@ -93,6 +94,12 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
     if FIXED_STEP > fit_error(calibration) {
         return Err(too_coarse(calibration));
     }
+    let ends = [spec.target_range.min(), spec.target_range.max()];
+    let [low, high] = ends.map(|end| spec.target.to_reference(end).abs());
+    if low.max(high) / FIXED_STEP > f64::from(i32::MAX) {
+        let reference = spec.reference.clone();
+        return Err(CalibrateError::FixedRange { reference, largest: low.max(high) });
+    }
     if !matches!(calibration.spec().model, Model::Observer(_)) {
         return Ok(FixedRecord { note, ..rated(calibration, adc)? });
     }
@@ -105,7 +112,7 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
 /// measures only a part of it, or measures it in few codes.
 ///
 /// # Errors
-/// [`CalibrateError::OutsideConverter`] if the converter measures no part of it.
+/// [`CalibrateError::OutsideConverter`] if the converter measures no part of it, or measures it in less than two codes.
 ///
 /// ```
 /// use stretch_calibrate::{converter_reach, parse_adc};
@@ -115,6 +122,7 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
 /// let reach = |adc| converter_reach(&signal, counts, &parse_adc(adc).unwrap());
 /// assert_eq!(reach("10,0,1023")?, None);
 /// assert!(reach("10,0,400")?.is_some_and(|note| note.contains("is from 193 to 456")));
+/// assert!(reach("10,0,1000000").unwrap_err().to_string().contains("only 0.3 codes"));
 /// assert!(reach("10,0,5").unwrap_err().to_string().contains("--adc"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -125,13 +133,21 @@ pub fn converter_reach(
 ) -> Result<Option<String>, CalibrateError> {
     let Interval { min, max } = range;
     let AdcSpec { zero_v, full_scale_v, .. } = adc.spec();
-    if max < zero_v || full_scale_v < min {
-        let signal = signal.clone();
-        return Err(CalibrateError::OutsideConverter { signal, min, max, zero_v, full_scale_v });
+    let codes = (max - min) / adc.volts_per_code();
+    let is_outside = max < zero_v || full_scale_v < min;
+    if is_outside || codes < LEAST_CODES {
+        let (signal, codes) = (signal.clone(), if is_outside { 0.0 } else { codes });
+        return Err(CalibrateError::OutsideConverter {
+            signal,
+            min,
+            max,
+            zero_v,
+            full_scale_v,
+            codes,
+        });
     }
     // a hundredth of the range is not worth a note
     let beyond = (zero_v - min).max(max - full_scale_v) > 0.01 * (max - min);
-    let codes = (max - min) / adc.volts_per_code();
     let what = match (beyond, codes < FEW_CODES) {
         (true, _) => "so that it measures only a part of that range".to_owned(),
         (false, true) => format!("so that the range has only {codes:.1} codes"),
@@ -147,6 +163,9 @@ pub fn converter_reach(
 
 /// A calibrated range with fewer codes than this is measured too coarsely.
 const FEW_CODES: f64 = 16.0;
+
+/// A converter that measures the calibrated range in fewer codes than this is in another unit than the signal.
+const LEAST_CODES: f64 = 2.0;
 
 /// What to do about a converter that does not fit the signal.
 pub(crate) const GIVE_ADC: &str = "give it with --adc BITS,ZERO,FULL_SCALE in the unit of the signal column, \

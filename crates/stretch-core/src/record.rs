@@ -51,7 +51,8 @@ pub fn store<'b, T: Serialize>(value: &T, buffer: &'b mut [u8]) -> Result<&'b [u
 /// Reads a value from the bytes of its record. No byte may be left over.
 ///
 /// # Errors
-/// [`DesignError::Damaged`] if the checksum does not match the bytes, [`DesignError::Schema`] for a newer schema,
+/// [`DesignError::Damaged`] if the checksum does not match the bytes, also if `bytes` is longer or shorter than the
+/// record, [`DesignError::Schema`] for a newer schema,
 /// [`DesignError::OtherRecord`] if the checksum is valid, but the bytes are not exactly one binary calibration of type `T`,
 /// [`DesignError::NoRecord`] if they are no binary calibration.
 ///
@@ -64,6 +65,8 @@ pub fn store<'b, T: Serialize>(value: &T, buffer: &'b mut [u8]) -> Result<&'b [u
 /// assert_eq!(record::load::<(u32, f64)>(bytes)?, (record::SCHEMA, 1.5));
 /// let mut damaged = bytes.to_vec();
 /// damaged[3] ^= 0x10;
+/// assert!(matches!(record::load::<(u32, f64)>(&damaged), Err(DesignError::Damaged { .. })));
+/// damaged.push(0); // a byte too many
 /// assert!(matches!(record::load::<(u32, f64)>(&damaged), Err(DesignError::Damaged { .. })));
 /// assert_eq!(record::load::<(u32, f64, f64)>(bytes), Err(DesignError::OtherRecord));
 /// assert_eq!(record::load::<(u32, f64)>(&[0xff; 64]), Err(DesignError::NoRecord)); // erased memory

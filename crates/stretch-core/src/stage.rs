@@ -68,6 +68,11 @@ impl<D: Design> Runner<D> {
         self.memory = self.design.memory();
     }
 
+    /// Returns the memory, for settings that a memory holds, such as the starting branch or the pressure of a receptor.
+    pub fn memory_mut(&mut self) -> &mut D::Memory {
+        &mut self.memory
+    }
+
     /// Returns the design.
     pub fn design(&self) -> &D {
         &self.design

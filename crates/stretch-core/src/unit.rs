@@ -2,6 +2,8 @@
 //!
 //! They have no arithmetic. Internal code uses the bare number (field `0`).
 
+use core::fmt;
+
 use crate::DesignError;
 
 macro_rules! unit {
@@ -41,6 +43,7 @@ unit! {
 /// use stretch_core::SampleRate;
 /// let rate = SampleRate::new(100.0).unwrap();
 /// assert_eq!(rate.period_s(), 0.01);
+/// assert_eq!(rate.to_string(), "100 Hz");
 /// assert!(SampleRate::new(0.0).is_err());
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
@@ -66,6 +69,13 @@ impl SampleRate {
     /// Returns the sample period in seconds.
     pub fn period_s(self) -> f64 {
         1.0 / self.0
+    }
+}
+
+impl fmt::Display for SampleRate {
+    /// Writes the rate with its unit, such as `100 Hz`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} Hz", self.0)
     }
 }
 

@@ -20,7 +20,7 @@ use stretch_core::{
 /// 32 bits becomes the nearest `i32`.
 ///
 /// Samples may have any unit. Scale them so that the largest leaves headroom for the overshoot of
-/// the section.
+/// the section. An `i32` cannot mark a missing sample: skip the step, and reset the memory after a long gap.
 ///
 /// ```
 /// use stretch_core::{Hertz, Runner, SampleRate};

@@ -11,7 +11,8 @@ pub struct TrackerSpec {
     /// lambda = sigma_acceleration T^2 / sigma_measurement, from 1e-6 to 1e6, dimensionless, where
     /// T is the sample period. It compares the motion due to the acceleration in one sample with
     /// the noise. A small index gives smooth but delayed estimates, a large index gives fast but
-    /// noisy ones.
+    /// noisy ones. With a typical acceleration of the signal in V/s^2 and the standard deviation of its noise in V, the
+    /// equation gives the index: 30 V/s^2 at 100 Hz (T = 0.01 s) and 0.003 V give 30 0.01^2 / 0.003 = 1.
     pub tracking_index: f64,
     /// The sample rate of the stream.
     pub sample_rate: SampleRate,

@@ -5,8 +5,9 @@ use stretch_filter::LARGEST_SAMPLE;
 
 use crate::Withheld;
 
-/// Largest number of missing samples in a row that are bridged by prediction; a further missing sample starts the
-/// warm-up again.
+/// Largest number of missing samples in a row that are bridged by prediction. After a further missing sample the model
+/// forgets its state: a model with a rate estimator warms up again; an observer answers at once, but its estimates
+/// settle within about a second.
 pub const MAX_BRIDGED: u8 = 3;
 
 /// A model behind a [`Front`].
@@ -79,7 +80,7 @@ impl Side for Branch {
 ///   have) gives [`Withheld::Missing`] and never enters the memory. For up to [`MAX_BRIDGED`] missing samples in a row
 ///   the model continues by its own prediction. After a further missing sample the model forgets its state, but not the
 ///   branch.
-/// - Until the model can answer, a sample gives [`Withheld::Warming`].
+/// - Until the model can answer, a sample gives [`Withheld::Warming`]. An observer answers from the first sample on.
 /// - The branch before the first movement is [`Branch::Inflation`] unless [`ReceptorMemory::starting_on`] sets another.
 ///   It changes when a rate leaves the dead band.
 ///
@@ -103,6 +104,30 @@ pub struct ReceptorMemory<M, S = Branch> {
 
 impl<M, S: Side> ReceptorMemory<M, S> {
     /// Returns the same memory on another branch, for a stream that is known to begin contracted.
+    ///
+    /// ```
+    /// use stretch_core::{Branch, Runner, SampleRate, Seconds, Volts};
+    /// use stretch_filter::{Arrival, Cadence};
+    /// use stretch_receptor::{Receptor, Withheld, example_observer};
+    ///
+    /// let mut receptor = Runner::new(Receptor::<f32>::new(&example_observer())?);
+    /// let memory = receptor.memory_mut();
+    /// *memory = memory.starting_on(Branch::Deflation);
+    /// assert_eq!(receptor.step(Volts(1.5)).unwrap().branch, Branch::Deflation);
+    /// // a Cadence finds the samples that a stream with time stamps lacks, and the receptor bridges them
+    /// let mut cadence = Runner::new(Cadence::new(SampleRate::new(100.0)?, 0.2)?);
+    /// for (time_s, volts) in [(0.0, 1.5), (0.01, 1.5), (0.04, 1.5)] {
+    ///     match cadence.step(Seconds(time_s)) {
+    ///         Arrival::Gap { missing } => (0..missing.min(4)).for_each(|_| {
+    ///             assert_eq!(receptor.step(Volts(f32::NAN)), Err(Withheld::Missing));
+    ///         }),
+    ///         Arrival::Backwards { .. } => receptor.reset(),
+    ///         _ => {}
+    ///     }
+    ///     assert!(receptor.step(Volts(volts)).is_ok());
+    /// }
+    /// # Ok::<(), stretch_receptor::ReceptorError>(())
+    /// ```
     #[must_use]
     pub fn starting_on(self, branch: Branch) -> Self {
         Self { side: S::of(branch), ..self }

@@ -18,7 +18,8 @@ pub struct Reading<T = f64> {
     pub branch: Branch,
     /// Whether the inputs lay in the calibrated domain.
     pub domain: Domain,
-    /// Standard deviation of the estimate, in the reference's unit, where the model estimates it.
+    /// Standard deviation of the estimate, in the reference's unit. A diagnosed model computes it; the other models give
+    /// `None`.
     pub sd: Option<T>,
 }
 
@@ -41,7 +42,7 @@ impl<T: Real> Reading<T> {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Domain {
-    /// Both inputs were inside: the estimate is an interpolation.
+    /// Both inputs of this sample were inside. The estimate of a model with memory also depends on earlier samples.
     Inside,
     /// The signal was outside, and was clamped.
     SignalClamped,
@@ -84,8 +85,8 @@ impl fmt::Display for Domain {
 pub enum Withheld {
     /// The rate estimator has not seen enough samples yet, and the model needs a rate.
     Warming,
-    /// The sample was missing, not a number or too large. The receptor bridges a short gap; a longer gap starts the
-    /// warm-up again.
+    /// The sample was missing, not a number or too large. The receptor bridges a short gap; after a longer gap the
+    /// model starts again ([`MAX_BRIDGED`](crate::MAX_BRIDGED)).
     Missing,
 }
 

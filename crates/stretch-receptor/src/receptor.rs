@@ -108,8 +108,8 @@ impl<T: Real, R> StretchReceptor<T, R> {
     /// [`CalibrationSpec::rate_estimator`]: stretch_core::CalibrationSpec::rate_estimator
     ///
     /// # Errors
-    /// [`ReceptorError::Rate`] for another estimator or sample rate (an `R` without a [name](NamedRate) is not
-    /// compared), or [`ReceptorError`] when the calibration is of another model or a coefficient leaves the range of
+    /// [`ReceptorError::Rate`] for another estimator or sample rate (an `R` whose [`NamedRate::named`]
+    /// is `None`, such as `()`, is not compared), or [`ReceptorError`] when the calibration is of another model or a coefficient leaves the range of
     /// `T`.
     pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError>
     where

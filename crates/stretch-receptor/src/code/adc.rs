@@ -16,14 +16,14 @@ impl AdcCode {
     pub const MISSING: Self = Self(-1);
 }
 
-/// Resolution and voltage range of a converter.
+/// Resolution and range of a converter, in the unit of the calibration's signal: volts, or counts for a signal of codes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AdcSpec {
     /// Bits of a code, 1 to 24. The receptors of this module accept up to 16.
     pub bits: u8,
-    /// Volts at code 0 (below zero for a bipolar converter).
+    /// The signal at code 0 (below zero for a bipolar converter).
     pub zero_v: f64,
-    /// Volts at the largest code, `2^bits - 1`.
+    /// The signal at the largest code, `2^bits - 1`.
     pub full_scale_v: f64,
 }
 

@@ -153,7 +153,8 @@ impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
     }
 
     /// Returns the largest difference between an estimate and the calibration evaluated in real numbers on the same
-    /// codes, in thousandths of the reference's unit (micrometres for a reference in millimetres).
+    /// codes, in thousandths of the reference's unit: micrometres (um) for a reference in millimetres, thousandths of a
+    /// degree for one in degrees.
     ///
     /// ```text
     /// 1/2 + roundings of the surface + steepest slopes times roundings of the inputs

@@ -92,6 +92,8 @@ pub struct Header {
     pub reference: Label,
     /// The board's converter.
     pub adc: Adc,
+    /// What the header lacks, and why: an integer form, or the watch of the gauge's zero.
+    pub notes: Vec<String>,
 }
 
 impl Header {
@@ -146,20 +148,32 @@ fn one(
         return float(calibration, turns, options);
     }
     match fixed(calibration, options) {
+        Ok(mut fixed) => {
+            fixed.notes.extend(turns.map(|_| NO_ZERO.to_owned()));
+            Ok(fixed)
+        }
         // a model without an integer form may have one in floats; a converter that does not fit remains an error
-        Err(
-            none @ ExportError::NoFixedForm(
-                CalibrateError::NoFixedForm { .. }
-                | CalibrateError::FixedRate { .. }
-                | CalibrateError::FixedStep { .. },
-            ),
-        ) => {
-            let float = float(calibration, turns, options)?;
-            if options.form.is_none() { Ok(float) } else { Err(none) }
+        Err(ExportError::NoFixedForm(
+            cause @ (CalibrateError::NoFixedForm { .. }
+            | CalibrateError::FixedRate { .. }
+            | CalibrateError::FixedStep { .. }
+            | CalibrateError::FixedRange { .. }),
+        )) => {
+            let mut float = float(calibration, turns, options)?;
+            if options.form.is_some() {
+                return Err(ExportError::NoFixedForm(cause));
+            }
+            float.notes.push(format!(
+                "the form is float, because {cause}. In float, stretch_step takes the signal and not a code of the converter"
+            ));
+            Ok(float)
         }
         other => other,
     }
 }
+
+const NO_ZERO: &str =
+    "the form fixed does not watch the zero of the gauge; --form float does (stretch_zero_step)";
 
 fn fixed(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
     let record = fixed_record(calibration, &options.adc).map_err(|error| match error {
@@ -330,7 +344,8 @@ fn assembled(
     let branches = rise_and_fall(source.target).map(|branch| source.target.branch_name(branch));
     let (step, adc) = (source.step(form), options.adc);
     let (signals, reference) = (source.signals, source.reference.clone());
-    Header { text, form, model, pressure, array: None, step, branches, signals, reference, adc }
+    let (array, notes) = (None, Vec::new());
+    Header { text, form, model, pressure, array, step, branches, signals, reference, adc, notes }
 }
 
 /// Returns the branches on which the reference rises and falls.
@@ -368,7 +383,7 @@ fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String
     let libm = if has.contains(&"sd") { "only sqrtf of libm (gcc needs -lm)" } else { "no libm" };
     let mut of = has.to_vec();
     of.extend((!has.contains(&"array")).then_some("one"));
-    of.extend((form == Form::Fixed).then_some("fixed"));
+    of.push(if form == Form::Fixed { "fixed" } else { "float" });
     kept(include_str!("c/opening.h"), &of)
         .replace("@SIGNAL@", &signal)
         .replace("@REFERENCE@", &reference)

@@ -48,7 +48,27 @@ fn integers_state_their_step_and_are_refused_where_it_exceeds_the_error_of_the_f
         // if no form is requested, the form with enough resolution is chosen
         let float = header(&metres, &options(None)).unwrap();
         assert_eq!((float.form, float.step), (Form::Float, None));
+        for part in ["the form is float, because", "steps of 0.001", "not a code of the converter"]
+        {
+            assert!(float.notes[0].contains(part), "{part}: {:?}", float.notes);
+        }
+        assert!(fixed.notes.is_empty() && fixed.text.contains("#define STRETCH_LAST_CODE"));
+        assert!(!float.text.contains("STRETCH_LAST_CODE"), "a program for codes compiles in float");
+        assert!(float.text.contains("A step takes the signal, not a code: STRETCH_ADC_ZERO"));
     }
+}
+
+#[test]
+fn a_reference_beyond_32_bits_is_exported_in_float() {
+    let calibration = changed(in_millimetres().next().unwrap(), |spec| {
+        spec.reference = Label::new("force_n").unwrap();
+        spec.target = Target::Contraction { rest_length: 2.95e6 };
+    });
+    let error = header(&calibration, &options(Some(Form::Fixed))).unwrap_err().to_string();
+    for part in ["force_n", "kN instead of N", "--form float"] {
+        assert!(error.contains(part), "{part}: {error}");
+    }
+    assert_eq!(header(&calibration, &options(None)).unwrap().form, Form::Float);
 }
 
 #[test]

@@ -51,16 +51,19 @@ void loop() {
   }
   due_us += STRETCH_PERIOD_US;
 @if one
+  int32_t code = analogRead(A0);
+  // the first and the last code also come from a loose wire or from a signal beyond the converter
+  bool is_measured = code > 0 && code < (1L << STRETCH_ADC_BITS) - 1;
 @if fixed
-  stretch_reading reading = stretch_step(&state, analogRead(A0));
+  stretch_reading reading = is_measured ? stretch_step(&state, code) : stretch_lost(&state);
 @end
 @if pressure
   float pressure = 0.0f;  // insert your measurement here, in the unit of the calibration's pressure
   stretch_set_pressure(&state, pressure);
 @end
 @if float
-  float sample = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)analogRead(A0);
-  stretch_reading reading = stretch_step(&state, sample);
+  float sample = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)code;
+  stretch_reading reading = is_measured ? stretch_step(&state, sample) : stretch_lost(&state);
 @end
   if (reading.status != STRETCH_OK) {
     Serial.println(reading.status == STRETCH_WARMING ? "warming" : "missing");

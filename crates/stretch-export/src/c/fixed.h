@@ -1,6 +1,10 @@
 /* Instead of a code: a missing sample, like any other number that is not a code. */
 #define STRETCH_NO_CODE (-1)
 
+/* The first code, 0, and the last code also come from a loose wire or from a signal beyond the
+ * converter. Call stretch_lost for them, unless the calibrated range reaches them. */
+#define STRETCH_LAST_CODE ((1L << STRETCH_ADC_BITS) - 1)
+
 /* Shifts of negative numbers must keep the sign, as on every known compiler for a board. */
 typedef char stretch_shifts_keep_signs[(-1 >> 1) == -1 ? 1 : -1];
 

@@ -1,6 +1,6 @@
 #include <float.h>
 
-/* The same bits as on the computer: each operation rounded by itself, in 32 bits. */
+/* The same bits as the Rust receptor in f32: each operation rounded by itself, in 32 bits. */
 #if defined(__FAST_MATH__)
 #error "stretch: compile without -ffast-math, which gives other bits"
 #endif

@@ -1,9 +1,12 @@
 /* A stretch receptor: @SIGNAL@ in, @REFERENCE@ out, every @PERIOD@ s.
  *
  * Model @MODEL@, form @FORM@: @TAKEN@ in,
- * @GIVEN@ out, with the same bits as on the computer.
+ * @GIVEN@ out, with the same bits as the Rust receptor of this form.
 @if fixed
  * Estimates have steps of @STEP@.
+@end
+@if float
+ * A step takes the signal, not a code: STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * code.
 @end
  * Written by stretch @VERSION@ from a calibration of @FROM@.
  *

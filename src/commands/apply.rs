@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use stretch_calibrate::{Applied, Seen, pressure_column};
+use stretch_calibrate::{Applied, Doubt, Faults, Seen, pressure_column};
 use stretch_core::{Calibration, Model};
 use stretch_data::files::{is_standard_output, write_whole};
 use stretch_data::{Trial, push_number, unit};
@@ -129,8 +129,20 @@ fn at_rate(gauge: &GaugeCalibration, rate_hz: f64) -> anyhow::Result<GaugeCalibr
 /// Prints a summary of a trial to standard error.
 fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
     let (calibration, applied) = (gauge.calibration(), &found.applied);
-    let faults = applied.faults;
     let (seen, doubts) = applied.seen(calibration, trial);
+    summarise(&seen, applied.faults);
+    doubts.iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
+    // The zero of another signal is no shift.
+    if seen.doubt().is_some() {
+        return;
+    }
+    let mut zero_watch = ZeroWatch::of(gauge, &trial.name);
+    found.zeros.iter().for_each(|(time_s, zero)| zero_watch.take(*time_s, zero));
+    zero_watch.end();
+}
+
+/// Prints the counts of a trial or a stream to standard error.
+fn summarise(seen: &Seen, faults: Faults) {
     // The count of missing samples saturates at `u32::MAX`.
     let at_least = if faults.missing >= u64::from(u32::MAX) - 1 { "at least " } else { "" };
     let Seen { samples, withheld, clamped, .. } = seen;
@@ -139,10 +151,6 @@ fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
          or late",
         faults.missing, faults.jittered,
     ));
-    doubts.iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
-    let mut zero_watch = ZeroWatch::of(gauge, &trial.name);
-    found.zeros.iter().for_each(|(time_s, zero)| zero_watch.take(*time_s, zero));
-    zero_watch.end();
 }
 
 /// Reads rows and writes each estimate immediately.
@@ -186,7 +194,7 @@ fn live(
                 let reading = receptor.step(row.time_s, row.values[0]);
                 let warning = seen.take(row.time_s, row.values[0], &reading);
                 if let Some(zero) = receptor.zero() {
-                    zero_watch.take(row.time_s, &zero);
+                    zero_watch.take_unless(seen.doubt(), row.time_s, &zero);
                 }
                 if let Some(warning) = warning {
                     warn(format!("stretch: {warning}"));
@@ -201,6 +209,7 @@ fn live(
         }
         say(rows.take_notes());
     }
+    summarise(&seen, receptor.faults());
     seen.doubt().iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
     zero_watch.end();
     Ok(())
@@ -271,6 +280,8 @@ struct ZeroWatch {
     /// Name of the trial with a colon, or empty for a stream.
     trial: String,
     shifted: bool,
+    /// Whether a doubt about the signal was reported.
+    has_doubt: bool,
     needs_signal_only: bool,
     last: Option<Zero<f64>>,
 }
@@ -284,8 +295,18 @@ impl ZeroWatch {
             unit: unit(calibration.spec().reference.as_str()).unwrap_or_default().to_string(),
             trial: if trial.is_empty() { String::new() } else { format!("{trial}: ") },
             shifted: false,
+            has_doubt: false,
             needs_signal_only: calibration.spec().model.needs_signal_only(),
             last: None,
+        }
+    }
+
+    /// Handles the state of the zero at the end of a movement, at `time_s`. If the signal is doubted, the doubt is reported
+    /// instead, once: the zero of another signal is no shift.
+    fn take_unless(&mut self, doubt: Option<Doubt>, time_s: f64, zero: &Zero<f64>) {
+        let Some(doubt) = doubt else { return self.take(time_s, zero) };
+        if !std::mem::replace(&mut self.has_doubt, true) {
+            warn(format!("stretch: {doubt}"));
         }
     }
 

@@ -110,7 +110,7 @@ fn table_of_models(rows: &[&ModelRow], chosen: &str) -> String {
         "delay ms",
         "worst",
         "coefficients",
-        "M3 instr.",
+        "M3 instr. (fixed)",
         SQUARED_EXCESS,
     ];
     let rows: Vec<Vec<String>> = rows.iter().map(row).collect();

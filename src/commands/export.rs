@@ -20,12 +20,12 @@ use stretch_sleeve::{RecordSummary, SleeveCalibration, describe_record, seal_rec
 use super::shared::{Completed, give_stdout, say, tell};
 use crate::display::warn;
 
-/// Export a calibration to a board, in C or as a file of integers; check or renew a file's seal
+/// Export a calibration to a board, in C or as a file of integers; check or renew a file's checksum
 ///
 /// In C it is one C99 header that also compiles as C++: the calibration as constants, stretch_init(),
 /// stretch_step() for a sample, stretch_lost() for a missing sample, and stretch_self_test(), which
 /// runs 200 samples and compares the estimates with those of the computer. It needs no allocation and
-/// no library, and gives the same bits as the computer.
+/// no library, and gives the same bits as the Rust receptor of the same form.
 ///
 ///   stretch export --calibration cal.json --c Elbow --arduino
 ///
@@ -37,8 +37,8 @@ use crate::display::warn;
 ///
 ///   stretch export --calibration cal.json --fixed cal.postcard --adc 12,0,3.3
 ///
-/// Every calibration file contains a checksum, its seal. Without any other option the command prints
-/// what the file is and whether its seal is valid. After you edit a JSON file by hand, renew the seal:
+/// Every calibration file contains a checksum. Without any other option the command prints what the
+/// file is and whether its checksum is valid. After you edit a JSON file by hand, renew the checksum:
 ///
 ///   stretch export --calibration cal.json
 ///   stretch export --calibration cal.json --seal
@@ -54,8 +54,9 @@ pub(crate) struct Args {
     /// Make the folder an Arduino library with the folder's name
     #[arg(long, requires = "c")]
     arduino: bool,
-    /// Write C in this form, fixed or float [default: fixed if the model has such a form]
+    /// Write C in this form, fixed or float [default: fixed; float if fixed is not possible]
     ///
+    /// If fixed is not possible, a note says why.
     /// fixed: integers, from converter codes to thousandths of the reference's unit. float: from the
     /// signal's unit to the reference's.
     #[arg(
@@ -78,7 +79,7 @@ pub(crate) struct Args {
     #[arg(long, default_value = "12,0,3.3", value_name = "BITS,ZERO,FULL_SCALE", requires = "written",
           value_parser = parse_adc)]
     adc: Adc,
-    /// Check the file and renew its seal, after a hand edit or from an earlier release
+    /// Check the file and renew its checksum, after a hand edit or from an earlier release
     #[arg(long, conflicts_with_all = ["c", "fixed"])]
     seal: bool,
 }
@@ -136,9 +137,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 /// Returns what to know about the converter of a header. A step in `float` takes the signal itself, so that a header
 /// for another converter can be used without its constants.
 fn notes(made: &Header) -> Vec<String> {
-    made.converter_notes().unwrap_or_else(|error| {
+    let mut notes = made.converter_notes().unwrap_or_else(|error| {
         vec![format!("{error}; otherwise do not use STRETCH_ADC_ZERO and STRETCH_ADC_PER_CODE")]
-    })
+    });
+    notes.extend_from_slice(&made.notes);
+    notes
 }
 
 /// Describes a calibration file and the state of its checksum, after renewing the checksum if
@@ -149,9 +152,9 @@ fn describe(path: &Path, is_sealing: bool) -> anyhow::Result<()> {
     }
     let RecordSummary { kind, seal, is_sealed } = describe_record(path)?;
     let state = match (is_sealing, is_sealed) {
-        (true, _) => "sealed",
-        (false, true) => "its seal is valid",
-        (false, false) => "from an earlier release, without a seal; --seal adds one",
+        (true, _) => "its checksum was renewed",
+        (false, true) => "its checksum is valid",
+        (false, false) => "from an earlier release, without a checksum; --seal adds one",
     };
     say(format!("{}: {kind}, {seal:08x}, {state}", path.display()))
 }

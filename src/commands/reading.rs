@@ -123,6 +123,13 @@ pub(crate) fn read_trials(
                 folder.display()
             );
         }
+        let (read, all) = (entries.len(), set.trials.len());
+        if read < all {
+            warn(format!(
+                "note: {}: {read} of its {all} trials are used, those with split = \"{split}\"",
+                folder.display()
+            ));
+        }
         let own = read_all(&entries, |entry| Recording::of_entry(entry, folder, options))?;
         // Reported once, because the error is in one line of dataset.toml.
         let wrong = own.iter().find_map(|trial| set.rate_mismatch(trial));

@@ -49,6 +49,11 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
             n.is_multiple_of(every).then_some([times * t + late_s, length, signal])
         })
     };
+    // Stamps that are up to 4 ms early or late, in no order.
+    let jitter = rows(&scratch, &|n, [t, length, signal]| {
+        let turn = (n as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11;
+        Some([t + 0.008 * (turn as f64 / 2_f64.powi(53) - 0.5), length, signal])
+    });
     let own = fs::read_to_string(scratch.loops("own.csv", 20.0, 1.0)).unwrap();
     let same = timed(1.0, 1, 0.0);
     let other = rows(&scratch, &|_, [t, length, signal]| Some([t, length + 0.1 * t.sin(), signal]));
@@ -61,7 +66,7 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
     let (files, all) = (&[EVALUATE, APPLY], &[EVALUATE, APPLY, STREAM]);
     let (evaluate, applied) = (&[EVALUATE], &[APPLY, STREAM]);
     let outside = "samples lie outside the range of the calibration";
-    let members: [Member<'_>; 20] = [
+    let members: [Member<'_>; 22] = [
         ("own.csv", own.clone(), &[APPLY], &["outside the calibrated domain"], &[]),
         ("own.csv", own, files, &[], &["is it the calibrated sensor"]),
         ("other.csv", other.clone(), evaluate, &[], &["cal:"]),
@@ -116,7 +121,15 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
         ("slow.csv", timed(1.0, 10, 0.0), applied, AT_10, &[]),
         ("slow_and_late.csv", timed(1.0, 10, 0.04), applied, AT_10, &[]),
         ("whole.csv", timed(1.0, 1, 0.0), applied, &[], &[ANOTHER]),
-        ("late.csv", timed(1.0, 1, 0.004), applied, &[], &[ANOTHER]),
+        ("late.csv", timed(1.0, 1, 0.004), applied, &["time stamps: 0 missing"], &[ANOTHER]),
+        (
+            "jitter.csv",
+            jitter,
+            applied,
+            &["time stamps: 0 missing"],
+            &[ANOTHER, "the zero has shifted"],
+        ),
+        ("in_ms.csv", timed(1e3, 1, 0.0), &[STREAM], &["are its times in ms?", "COL:ms"], &[]),
         ("a_little_slow.csv", timed(1.05, 1, 0.0), applied, &[], &[ANOTHER]),
     ];
     for (name, log, lines, says, says_not) in members {

@@ -186,6 +186,10 @@ impl Status {
         if other_version > 0 {
             text += &format!(", {other_version} of another version: update stretch or the board");
         }
+        if frames == 0 && damaged > 0 {
+            text += "; no line is a frame, which begins with $S1: the board sends text, as the Arduino example Live does, or \
+                     has another speed (--port PATH:BAUD)";
+        }
         match self.rows {
             Some(0) => text += "; no row was recorded, so no file was written",
             Some(rows) => text += &format!("; {rows} rows recorded"),

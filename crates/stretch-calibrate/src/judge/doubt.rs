@@ -225,7 +225,7 @@ impl Pace {
 
     /// Counts the time of a sample. Returns a doubt, at most once, if the usual interval differs from that of the
     /// calibration. In a slower stream, samples count as missing, so the rates are right, but there are gaps. In a
-    /// faster stream the rates are wrong.
+    /// faster stream the rates are wrong. A rate that is a thousand times too low shows times in milliseconds.
     fn take(&mut self, time_s: f64) -> Option<Doubt> {
         if self.is_told || !time_s.is_finite() || self.stamps_s.last() == Some(&time_s) {
             return None;
@@ -244,6 +244,15 @@ impl Pace {
         let (found_hz, rate_hz) = (rate_of(&stamps_s)?, self.rate_hz);
         if (rate_hz / found_hz - 1.0).abs() <= PACE_TOLERANCE {
             return None;
+        }
+        let units = [(1e3, "ms"), (1e6, "us"), (1e9, "ns")];
+        let is_near = |factor: f64| (rate_hz / found_hz / factor - 1.0).abs() <= PACE_TOLERANCE;
+        if let Some((_, unit)) = units.into_iter().find(|(factor, _)| is_near(*factor)) {
+            let text = format!(
+                "the log has {found_hz:.4} samples a second, the calibration {rate_hz:.4}: are its times in {unit}? Then read them with \
+                 --time COL:{unit}, where COL is the time column"
+            );
+            return Some(Doubt::new("other_rate", text));
         }
         let what = if self.needs_signal_only {
             "the estimates are right, but their rates of change are wrong"

@@ -56,9 +56,8 @@ pub(crate) struct Args {
     arduino: bool,
     /// Write C in this form, fixed or float [default: fixed; float if fixed is not possible]
     ///
-    /// If fixed is not possible, a note says why.
     /// fixed: integers, from converter codes to thousandths of the reference's unit. float: from the
-    /// signal's unit to the reference's.
+    /// signal's unit to the reference's. If fixed is not possible, a note says why.
     #[arg(
         long,
         value_name = "FORM",

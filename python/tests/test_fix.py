@@ -165,6 +165,11 @@ def test_recordings_end_to_end_and_several_outputs():
     }
     found = stretch_gap.diagnose(Both(), seen, parameters=parameters, **question)
     assert sorted(found.named) == ["eye.output.skew", "servo.input.delay", "servo.output.backlash"]
+    one = {name: np.concatenate([rows[name] for rows in seen]) for name in ("cmd_deg", "angle_deg")}
+    trials = found.fix()._again.asked.spans
+    assert found.fix()(inputs=one, trials=trials)["angle_deg"].shape == (1, one["cmd_deg"].size)
+    with pytest.raises(stretch_gap.StretchError, match="fix: missing a required argument: 'trials'; .* takes inputs, trials"):
+        found.fix()(inputs=one)
     again = stretch_gap.diagnose(found.fix(), seen, **question)
     assert again.verdict == "no_gap", again.sentence
     for output in ("angle_deg", "seen_V"):

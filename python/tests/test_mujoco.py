@@ -9,6 +9,7 @@ import stretch_gap
 mujoco = pytest.importorskip("mujoco", reason="SKIPPED: the package mujoco is not installed")
 import stretch_gap.mujoco  # noqa: E402
 
+# The joint and its actuator have the same name.
 ONE = """
 <mujoco model="pendulum">
   <option timestep="0.002" integrator="implicitfast"/>
@@ -18,7 +19,7 @@ ONE = """
       <geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02" mass="0.5"/>
     </body>
   </worldbody>
-  <actuator><position name="motor" joint="elbow" kp="20" kv="1"/></actuator>
+  <actuator><position name="elbow" joint="elbow" kp="20" kv="1"/></actuator>
 </mujoco>
 """
 TWO = """
@@ -164,7 +165,7 @@ def test_what_cannot_be_right_is_told_with_what_to_do():
     told("quaternion", model=ball.split("<actuator>")[0] + "</mujoco>", joints=["elbow"])
     told(
         "is not a position actuator",
-        model=ONE.replace('<position name="motor" joint="elbow" kp="20" kv="1"/>', '<motor name="motor" joint="elbow"/>'),
+        model=ONE.replace('<position name="elbow" joint="elbow" kp="20" kv="1"/>', '<motor name="motor" joint="elbow"/>'),
     )
 
 

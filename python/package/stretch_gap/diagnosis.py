@@ -143,8 +143,13 @@ class Diagnosis:
 
     @property
     def not_examined(self) -> list[str]:
-        """Effects that were not examined, list of str, because all of their runs failed or the budget of runs was spent."""
-        return [*self._answer.get("not_examined", []), *(self._answer.get("cut_short") or [])]
+        """Effects that were not examined, list of str.
+
+        All of their runs failed, the budget of runs was spent, or a first test left them out of an open answer (verdict
+        `"partial"` or `"unknown"`).
+        """
+        keys = ("not_examined", "cut_short", "not_fitted")
+        return [name for key in keys for name in self._answer.get(key) or []]
 
     @property
     def probabilities(self) -> dict[str, float]:

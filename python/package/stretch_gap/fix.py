@@ -132,6 +132,8 @@ class Fix:
         for name in asked.effects:
             if name not in own:
                 raise StretchError(f"effects: there is no value of {name}; give the value at which it does nothing")
+        if asked.many and "inputs" in named:  # a simulator of many models takes one row per model
+            named["inputs"] = {name: np.atleast_2d(values) for name, values in named["inputs"].items()}
         spans = [trial.samples for trial in named.get("trials", [] if asked.is_called_once_a_trial else asked.spans)]
         for one in self._around:
             if one.is_in_front and "inputs" not in named:
@@ -140,6 +142,11 @@ class Fix:
                 if one.columns[0] not in named["inputs"]:
                     raise unknown("column", one.columns[0], named["inputs"], "inputs: ")
                 named["inputs"] = one.act(named["inputs"], spans)
+        try:
+            asked.signature.bind({}, {}, **named)
+        except TypeError as error:
+            takes = ", ".join(list(asked.signature.parameters)[2:]) or "nothing else"
+            raise StretchError(f"fix: {error}; after params and effects, the simulator takes {takes}") from error
         if asked.many:
             models = next((len(table) for table in (params, effects) if not isinstance(table, (Mapping, NoneType))), 1)
             given: tuple[Any, Any] = (_table(values, asked.parameters, models), _table(own, asked.effects, models))

@@ -71,17 +71,22 @@ def apply(diagnosis: Diagnosis, spec: Any) -> list[str]:
     --------
     >>> left = stretch_gap.mujoco.apply(found, problem.spec)  # doctest: +SKIP
     """
-    known = {joint.name: joint for joint in spec.joints} | {actuator.name: actuator for actuator in spec.actuators}
-    own = {name: next(iter(values.values())) for name, values in diagnosis.effects.items() if parts(name)[0] in known and values}
+    own = {name: next(iter(values.values())) for name, values in diagnosis.effects.items() if _owner(spec, name) and values}
     for name, value in {**diagnosis.parameters, **own}.items():
-        owner, what = parts(name)
-        if owner not in known:
-            raise StretchError(
-                f"{name}: the specification has no joint or actuator {owner}; give that of the problem (problem.spec)"
-            )
-        _write_spec(known[owner], what, value)
+        found = _owner(spec, name)
+        if found is None:
+            owner, what = parts(name)
+            kind = "joint" if what in DOF else "actuator"
+            raise StretchError(f"{name}: the specification has no {kind} {owner}; give that of the problem (problem.spec)")
+        _write_spec(found, parts(name)[1], value)
     left = [name for name in diagnosis.effects if name not in own]
     return [name for name in left if not _delayed(diagnosis, spec, name)]
+
+
+def _owner(spec: Any, name: str) -> Any:
+    """Return the joint or the actuator of a value. The two may have the same name, so the value decides."""
+    owner, what = parts(name)
+    return next((one for one in (spec.joints if what in DOF else spec.actuators) if one.name == owner), None)
 
 
 def _write_spec(owner: Any, what: str, value: float) -> None:

@@ -10,8 +10,13 @@
 //! | --- | --- | --- |
 //! | jitters | noise that follows the rate, if this is the most likely cause: [`jitter`](super::jitter) | standard deviation of the time error |
 //! | swings | sines of one frequency f, of any phase in each stretch: sum over stretches (2/n) \|sum r exp(-i 2 pi f t)\|^2 | f, and the amplitude |
-//! | jumps | changes of more than six noises: sum of their d_i^2 | how many a second, and their root mean square |
+//! | jumps | at least eight changes of more than six noises, each twice as large as the changes before and after: sum of their d_i^2 | how many a second, and their root mean square |
 //! | drifts | reported if no other course explains enough | root mean square, and the time after which the autocorrelation has fallen to 1/e |
+//!
+//! A signal that moves with the simulated output is not reported as jumping: what is late by a
+//! constant time changes whenever the output steps. The changes of the output s_i, at the two lags
+//! that explain most, must explain less than a quarter of what the jumps explain:
+//! (sum d_i s_(i-k))^2 / sum s_i^2 for a lag of k samples.
 
 use std::f64::consts::TAU;
 
@@ -25,6 +30,15 @@ const SHARE: f64 = 0.5;
 /// A change by more than this many multiples of the noise is a jump. By chance, one such change
 /// occurs in a thousand recordings of 3e4 samples each.
 const JUMP: f64 = 6.0;
+/// A jump is at least this many times as large as the changes before and after it. Smooth courses
+/// with little noise contain large changes, but these have neighbours of about the same size.
+const ALONE: f64 = 2.0;
+/// Smallest number of jumps.
+const LEAST_JUMPS: usize = 8;
+/// Share of the jumps' power that changes of the simulated output may explain.
+const DRIVEN: f64 = 0.25;
+/// Largest lag of the residual behind the simulated output, in samples.
+const LAGS: usize = 200;
 /// Smallest number of periods that a stretch must contain for a frequency to count.
 const TURNS: f64 = 3.0;
 /// Largest frequency, in periods per sample.
@@ -92,7 +106,7 @@ impl Course {
             let size = noise * (above / samples as f64).sqrt();
             Self::Drifts { size, correlation_s: dt_s * forgotten_after(stretches) as f64 }
         };
-        Some(swings().or_else(|| jumps(stretches, noise, dt_s)).unwrap_or_else(drifts))
+        Some(swings().or_else(|| jumps(stretches, shown, noise, dt_s)).unwrap_or_else(drifts))
     }
 
     /// Describes the course in words, with the unit of the channel.
@@ -149,17 +163,46 @@ fn taken(stretch: &[f64], turns: f64) -> f64 {
     2.0 * power / stretch.len().max(1) as f64
 }
 
-fn jumps(stretches: &[&[f64]], noise: f64, dt_s: f64) -> Option<Course> {
-    let changes = || stretches.iter().flat_map(|s| s.windows(2).map(|p| p[1] - p[0]));
-    let count = changes().count() as f64;
-    let all: f64 = changes().map(|d| d * d).sum();
-    let large: Vec<f64> = changes().filter(|d| d.abs() > JUMP).map(|d| d * d).collect();
+/// Returns the changes from sample to sample.
+fn changes(values: &[f64]) -> Vec<f64> {
+    values.windows(2).map(|p| p[1] - p[0]).collect()
+}
+
+fn jumps(stretches: &[&[f64]], shown: &[Vec<f64>], noise: f64, dt_s: f64) -> Option<Course> {
+    let changed: Vec<Vec<f64>> = stretches.iter().map(|s| changes(s)).collect();
+    let count = changed.iter().map(Vec::len).sum::<usize>() as f64;
+    let all: f64 = changed.iter().flatten().map(|d| d * d).sum();
+    let is_alone = |d: &[f64]| d[1].abs() > JUMP.max(ALONE * d[0].abs().max(d[2].abs()));
+    let alone = changed.iter().flat_map(|d| d.windows(3)).filter(|d| is_alone(d));
+    let large: Vec<f64> = alone.map(|d| d[1] * d[1]).collect();
     let sum: f64 = large.iter().sum();
-    let is_jumping = !large.is_empty() && sum >= SHARE * (all - 2.0 * count);
+    let is_jumping = large.len() >= LEAST_JUMPS
+        && sum >= SHARE * (all - 2.0 * count)
+        && driven(&changed, shown) < DRIVEN * sum;
     is_jumping.then(|| Course::Jumps {
         per_s: large.len() as f64 / (count * dt_s),
         size: noise * (sum / large.len() as f64).sqrt(),
     })
+}
+
+/// Returns the sum of squares that changes of the simulated output explain in changes of the
+/// residual, at the two lags that explain most.
+fn driven(changed: &[Vec<f64>], shown: &[Vec<f64>]) -> f64 {
+    let moved: Vec<Vec<f64>> = shown.iter().map(|s| changes(s)).collect();
+    let squares: f64 = moved.iter().flatten().map(|s| s * s).sum();
+    if squares == 0.0 {
+        return 0.0;
+    }
+    let at = |lag: usize| {
+        let pairs = changed.iter().zip(&moved).filter(|(d, _)| d.len() > lag);
+        let product = pairs
+            .map(|(d, s)| d[lag..].iter().zip(s).map(|(d, s)| d * s).sum::<f64>())
+            .sum::<f64>();
+        product * product / squares
+    };
+    let mut explained: Vec<f64> = (0..=LAGS).map(at).collect();
+    explained.sort_by(|a, b| b.total_cmp(a));
+    explained.iter().take(2).sum()
 }
 
 /// Returns the lag, in samples, at which the autocorrelation has fallen to 1/e of that at a lag of
@@ -229,6 +272,63 @@ mod tests {
         // 240 jumps are expected, with a standard deviation of sqrt(240) = 15.
         assert!((1.6..2.4).contains(&per_s), "{per_s}");
         assert!((size / 0.024 - 1.0).abs() < 0.05, "{size}");
+    }
+
+    /// A delay, a lag, warming and dry friction follow the motion of the simulator. They are not
+    /// described as jumps, whether the command steps or moves smoothly.
+    #[test]
+    fn what_follows_the_motion_does_not_jump() {
+        let steps = |i: usize| if (i / 130).is_multiple_of(2) { 40.0 } else { -40.0 };
+        let smooth = |i: usize| 400.0 * libm::sin(0.013 * i as f64) * libm::cos(0.0041 * i as f64);
+        let kept = libm::exp(-1.0 / 15.0);
+        for (command, shown) in [("steps", &steps as &dyn Fn(usize) -> f64), ("smooth", &smooth)] {
+            let output: Vec<f64> = (0..12_000).map(shown).collect();
+            let late = |i: usize| output[i.saturating_sub(7)] - output[i];
+            let lagging: Vec<f64> = output
+                .iter()
+                .scan(output[0], |y, x| {
+                    *y = kept * *y + (1.0 - kept) * x;
+                    Some(*y - x)
+                })
+                .collect();
+            let lag = |i: usize| lagging[i];
+            let warming = |i: usize| 30.0 * (1.0 - libm::exp(-1e-3 * i as f64));
+            let friction = |i: usize| 9.0 * (output[i] - output[i.saturating_sub(1)]).signum();
+            let courses: [(&str, &dyn Fn(usize) -> f64); 4] =
+                [("delay", &late), ("lag", &lag), ("warming", &warming), ("friction", &friction)];
+            for (seed, (name, course)) in (20..).zip(courses) {
+                let values = beside_noise(course, seed);
+                let stretches: Vec<&[f64]> = values.chunks(6000).collect();
+                let shown: Vec<Vec<f64>> = output.chunks(6000).map(<[f64]>::to_vec).collect();
+                let found = Course::of(&stretches, &shown, 0.002, DT_S);
+                assert!(
+                    !matches!(found, Some(Course::Jumps { .. })),
+                    "{name}, {command}: {found:?}"
+                );
+            }
+        }
+    }
+
+    /// Jumps at random times are reported although the simulator moves in steps.
+    #[test]
+    fn jumps_apart_from_the_motion_are_reported() {
+        let mut random = RandomGenerator::new(7, 1);
+        let mut level = 0.0;
+        let course: Vec<f64> = (0..12_000)
+            .map(|_| {
+                if random.unit() < 0.01 {
+                    level = if level == 0.0 { 12.0 } else { 0.0 };
+                }
+                level
+            })
+            .collect();
+        let values = beside_noise(|i| course[i], 8);
+        let stretches: Vec<&[f64]> = values.chunks(6000).collect();
+        let steps = |i: usize| if (i / 130).is_multiple_of(2) { 40.0 } else { -40.0 };
+        let shown: Vec<f64> = (0..12_000).map(steps).collect();
+        let shown: Vec<Vec<f64>> = shown.chunks(6000).map(<[f64]>::to_vec).collect();
+        let found = Course::of(&stretches, &shown, 0.002, DT_S);
+        assert!(matches!(found, Some(Course::Jumps { .. })), "{found:?}");
     }
 
     #[test]

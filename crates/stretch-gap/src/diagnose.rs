@@ -24,6 +24,7 @@ use crate::{
     problem::{
         altered_parameters::Altered,
         error::{GapError, if_possible},
+        sample_roles::SampleRoles,
         simulator::Simulator,
     },
     record::{
@@ -45,9 +46,9 @@ use crate::{
         judge::{Case, Judged, judge},
         note::Note,
         notes::{
-            answer_notes, detection_limit_note, extrapolation_notes, gross_error_notes,
-            implausible_noise_notes, lost_note, recorder_notes, retuning_notes, start_notes,
-            swing_notes,
+            answer_notes, detection_limit_note, extrapolation_notes, friction_note,
+            gross_error_notes, implausible_noise_notes, lost_note, not_fitted_note, recorder_notes,
+            retuning_notes, start_notes, swing_notes,
         },
     },
 };
@@ -100,7 +101,11 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     let begun = Stopwatch::start();
     let simulator = task.simulator;
     let columns = columns_alone(&simulator.columns(), simulator.trials(), simulator.dt_s());
-    let examines_effects = task.examines_effects && columns.is_empty();
+    // On a recording that is too short, no effect is named, so none is examined.
+    let about = simulator.description();
+    let is_sufficient =
+        too_little(&SampleRoles::of(simulator)?, about.rows_used(), about.dt_s).is_none();
+    let examines_effects = task.examines_effects && columns.is_empty() && is_sufficient;
     let task = Task { examines_effects, ..task };
     let between_rows = command_timing::between_rows(simulator);
     let (problem, from) = prepare(task, between_rows.as_ref())?;
@@ -352,8 +357,13 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
     let mut evidence = Evidence::gather(problem, found)?;
     let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
     let (all, held) = candidates(problem, &evidence, all, seed)?;
+    let about = problem.simulator().description();
+    let too_little = too_little(&evidence.roles, about.rows_used(), about.dt_s);
     let mut proposal = None;
     let lacks = |evidence: &Evidence, best: &Hypothesis| {
+        if too_little.is_some() {
+            return Ok(None);
+        }
         (task.progress)("what the catalogue lacks");
         proposal = if_possible(propose(problem, &problem.nominal))?.flatten();
         let Some(proposal) = &proposal else { return Ok(None) };
@@ -373,8 +383,6 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
         end_to_end: if_possible(localise::end_to_end(&problem.compare.runs, &evidence))?
             .unwrap_or_default(),
     };
-    let about = problem.simulator().description();
-    let too_little = too_little(&evidence.roles, about.rows_used(), about.dt_s);
     Ok(Gathered {
         evidence,
         null_band,
@@ -414,7 +422,7 @@ fn propose_rest(
     verdict: VerdictKind,
 ) -> Result<Option<Proposed>, GapError> {
     let with_names = verdict == VerdictKind::Partial;
-    if !with_names && verdict != VerdictKind::Unknown {
+    if gathered.too_little.is_some() || (!with_names && verdict != VerdictKind::Unknown) {
         return Ok(None);
     }
     let known = (with_names, gathered.proposed.as_ref());
@@ -480,6 +488,10 @@ fn report(
         reservations.push(Note::default().text(because).effects(&not_examined, ", "));
     }
     notes.extend(reservations.iter().cloned());
+    let is_open = matches!(judged.kind, VerdictKind::Partial | VerdictKind::Unknown);
+    let is_searched = is_open && task.depth() > 0 && too_little.is_none();
+    let mut not_fitted = if is_searched { searched.not_looked_at() } else { Vec::new() };
+    not_fitted.retain(|name| !not_examined.contains(name));
     notes.extend(searched.problem.starts.note().map(Note::from));
     notes.extend(recorder_notes(cause.problem).into_iter().map(Note::from));
     if evidence.gap.retuned > thresholds.least_gap {
@@ -495,6 +507,11 @@ fn report(
     let model_runs = runs.counted();
     let spent = model_runs.and_then(|runs| runs.note());
     let cut_short = spent.is_some().then(|| searched.not_looked_at());
+    if spent.is_some() {
+        not_fitted.clear();
+    }
+    notes.extend(not_fitted_note(&not_fitted));
+    notes.extend(friction_note(simulator, &naming.named));
     notes.extend(spent.map(Note::from));
     let no_name = is_quiet.then(|| detection_limit_note(&detection_limits, simulator.effects()));
     notes.extend(no_name.flatten());
@@ -515,6 +532,7 @@ fn report(
         sentence: String::new(),
         not_examined,
         cut_short,
+        not_fitted,
         tied: naming.tied(),
         named,
         faint: naming.faint,

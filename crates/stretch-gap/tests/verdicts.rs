@@ -52,6 +52,18 @@ fn a_missing_effect_is_named_with_its_size() {
     assert!(size.interval[0] <= 0.2 && 0.2 <= size.interval[1], "{size:?}");
 }
 
+/// On a recording that is too short to name an effect, no effect is simulated and none is suggested.
+#[test]
+fn a_short_recording_is_refused_before_the_search() {
+    let toy = line().hiding(&[(Effect::Cubic, &[0.2])]);
+    let long = told(&toy.measured(3));
+    let told = told(&Toy { trials: vec![(500, false), (200, true)], ..toy }.measured(3));
+    assert_eq!(told.verdict, VerdictKind::Unknown, "{}", told.sentence);
+    assert!(told.sentence.starts_with("The recording is too short"), "{}", told.sentence);
+    assert!(told.notes.iter().all(|note| !note.to_string().contains("cubic")), "{:?}", told.notes);
+    assert!(4 * told.simulations < long.simulations, "{} {}", told.simulations, long.simulations);
+}
+
 /// A play outside the catalogue, plus a drift in the catalogue that closes less.
 #[test]
 fn what_the_catalogue_lacks_is_unknown() {

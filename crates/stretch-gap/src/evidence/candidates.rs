@@ -46,7 +46,8 @@ pub struct Candidate {
     /// Excess that the set leaves: the larger of those on fitted and test trials.
     #[serde(default)]
     pub left: f64,
-    /// Whether the strongest effect of the set is at an end of its range.
+    /// Whether the strongest effect of the set is at an end of its range, which makes a cause
+    /// outside the catalogue more probable. [`EffectValue::at_bound`] tells of every effect.
     #[serde(default)]
     pub at_bound: bool,
     /// Closed-gap fraction.
@@ -70,6 +71,26 @@ impl Candidate {
     pub fn fits_worse(&self) -> bool {
         1.0 + self.left > 1.2 * 1.2 * (1.0 + self.gap_after)
     }
+
+    /// Root mean square that the set leaves, in multiples of the noise: on test trials, or on the
+    /// fitted trials if the set [fits these worse](Self::fits_worse).
+    ///
+    /// ```
+    /// use stretch_gap::Candidate;
+    /// fn check(candidate: &Candidate) {
+    ///     let fits = Candidate { gap_after: 3.0, left: 3.2, ..candidate.clone() };
+    ///     assert_eq!(fits.leaves(), 2.0);
+    /// }
+    /// ```
+    pub fn leaves(&self) -> f64 {
+        multiple(if self.fits_worse() { self.left } else { self.gap_after })
+    }
+}
+
+/// Returns the root mean square of a residual in multiples of the noise, from its excess (reduced
+/// chi-square minus 1).
+pub(crate) fn multiple(excess: f64) -> f64 {
+    (1.0 + excess).max(0.0).sqrt()
 }
 
 /// A fitted parameter of an effect.
@@ -91,6 +112,10 @@ pub struct EffectValue {
     /// Whether the parameter describes only the form of the effect, not its strength.
     #[serde(default)]
     pub is_form: bool,
+    /// Whether the value is a strength at an end of its range. The effect then probably compensates
+    /// for another cause.
+    #[serde(default)]
+    pub at_bound: bool,
 }
 
 /// A nominal parameter, re-tuned.
@@ -279,6 +304,7 @@ fn effect_values(simulator: &dyn Simulator, hypothesis: &Hypothesis) -> Vec<Effe
                 sd,
                 interval: interval(p, *value, sd),
                 is_form: p.usual_form().is_some(),
+                at_bound: spec.ends(p, *value),
             });
         }
     }

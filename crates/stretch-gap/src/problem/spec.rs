@@ -187,16 +187,20 @@ impl EffectSpec {
     /// Whether a size of the effect is at an end of its range, other than the value that switches
     /// the effect off. The effect then compensates for something else.
     pub(crate) fn is_at_bound(&self, values: &[f64]) -> bool {
-        let mut fitted = self.parameters.iter().zip(values).filter(|(p, _)| p.is_fitted());
-        fitted.any(|(p, value)| {
-            let near = |end: f64| match p.is_log() {
-                true => (value / end).ln().abs() < AT_END * (p.max / p.min).ln(),
-                false => (value - end).abs() < AT_END * (p.max - p.min),
-            };
-            // Only sizes are checked. If a time constant wants to leave its range, the effect is
-            // still the right cause. If a size does, the cause is another.
-            p.off().is_some_and(|off| !near(off)) && (near(p.min) || near(p.max))
-        }) && !self.is_found
+        self.parameters.iter().zip(values).any(|(p, value)| self.ends(p, *value))
+    }
+
+    /// Whether a parameter of the effect is a size, and its value is at an end of its range, other
+    /// than the value that switches the effect off.
+    pub(crate) fn ends(&self, p: &EffectParameter, value: f64) -> bool {
+        let near = |end: f64| match p.is_log() {
+            true => (value / end).ln().abs() < AT_END * (p.max / p.min).ln(),
+            false => (value - end).abs() < AT_END * (p.max - p.min),
+        };
+        // Only sizes are checked. If a time constant wants to leave its range, the effect is still
+        // the right cause. If a size does, the cause is another.
+        let is_size = p.is_fitted() && !self.is_found;
+        is_size && p.off().is_some_and(|off| !near(off)) && (near(p.min) || near(p.max))
     }
 }
 

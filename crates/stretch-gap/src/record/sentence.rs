@@ -80,8 +80,9 @@ impl Gross {
     }
 
     /// Creates the error that simulator and recording of an output differ by a factor, because of
-    /// other units, or because no parameter of the simulator may change.
-    fn of_factor(column: &Column<'_>, factor: f64, units: Option<String>) -> Self {
+    /// other units, or because no parameter of the simulator may change (`is_exact`).
+    fn of_factor(column: &Column<'_>, factor: f64, units: Option<String>, is_exact: bool) -> Self {
+        let or = if is_exact { ", or give the parameters of the simulator tolerances" } else { "" };
         let that_is = units.as_ref().map_or(String::new(), |units| format!(": that is {units}"));
         let ratio = short(1.0 / factor);
         Self {
@@ -90,8 +91,9 @@ impl Gross {
                 "the simulator's {} is {ratio} times the recording's{that_is}",
                 column.name
             ),
-            hint: "let the simulator answer in the unit of the recording, or convert the recording, or give the parameters of the simulator tolerances"
-                .into(),
+            hint: format!(
+                "let the simulator answer in the unit of the recording, or convert the recording{or}"
+            ),
             units,
             ..Self::of_column(GrossKind::Factor, column)
         }
@@ -131,7 +133,7 @@ impl Gross {
                 let units = units.filter(|_| is_output);
                 let is_exact = suspect.description().parameters.iter().all(|p| p.sd == 0.0);
                 if units.is_some() || fault.is_beyond() || is_exact && is_output {
-                    return Some(Self::of_factor(column, factor, units));
+                    return Some(Self::of_factor(column, factor, units, is_exact));
                 }
                 let sentence = match factor >= 1.0 {
                     true => format!("{name} looks {factor:.3} times too large"),

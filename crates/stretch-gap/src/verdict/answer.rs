@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     evidence::{
-        candidates::Candidate,
+        candidates::{Candidate, multiple},
         gathered::{Evidence, Excess},
         shares::EffectShare,
     },
@@ -78,6 +78,13 @@ pub enum Answer {
         closes: f64,
         /// What is left with them.
         left: f64,
+        /// Whether much more is left on the fitted trials than on the test trials.
+        #[serde(default)]
+        fits_worse: bool,
+        /// Probability that the effects or their alternatives are right; none if an older version
+        /// wrote the answer.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        probability: Option<f64>,
         /// Where that is.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         rest: Option<Unexplained>,
@@ -127,8 +134,6 @@ pub enum Answer {
     TooLittle {
         /// The reason.
         why: TooLittle,
-        /// The answer without this finding.
-        otherwise: Box<Answer>,
     },
 }
 
@@ -166,11 +171,11 @@ pub struct Closed {
 
 impl Closed {
     /// Describes a candidate among candidates with the same effects up to a tie.
-    fn of(candidate: &Candidate, probability: f64, excess: f64) -> Self {
+    fn of(candidate: &Candidate, probability: f64) -> Self {
         Self {
             share: candidate.closed,
             interval: candidate.closed_ci,
-            left: multiple(excess),
+            left: candidate.leaves(),
             fits_worse: candidate.fits_worse(),
             probability,
         }
@@ -203,9 +208,7 @@ impl Answer {
         let seen = Self::seen(findings, simulator, evidence);
         match &findings.judged.overruled {
             None => seen,
-            Some(Overruled::TooLittle(why)) => {
-                Self::TooLittle { why: *why, otherwise: Box::new(seen) }
-            }
+            Some(Overruled::TooLittle(why)) => Self::TooLittle { why: *why },
             Some(Overruled::AtBounds(found)) => {
                 let name = |p: &usize| simulator.parameters()[*p].name.clone();
                 Self::AtBounds {
@@ -233,12 +236,12 @@ impl Answer {
         match (judged.seen, findings.candidates.first()) {
             (VerdictKind::Record, first) => {
                 let first = first.filter(|_| !gross.iter().any(Gross::is_plain));
-                let corrected = first.map(|first| Closed::of(first, first.probability, gap.left));
+                let corrected = first.map(|first| Closed::of(first, first.probability));
                 Self::WrongRecord { errors: gross.to_vec(), corrected }
             }
             (VerdictKind::Effect, Some(first)) => {
                 let probability = judged.seen_naming.probability(findings.candidates);
-                let closes = Closed::of(first, probability, gap.left);
+                let closes = Closed::of(first, probability);
                 Self::Missing { effects: missing(), closes, faint, ended }
             }
             (VerdictKind::Partial, Some(first)) => {
@@ -248,22 +251,28 @@ impl Answer {
                 Self::Partly {
                     effects,
                     closes: first.closed,
-                    left: multiple(gap.left),
+                    left: first.leaves(),
+                    fits_worse: first.fits_worse(),
+                    probability: Some(judged.seen_naming.probability(findings.candidates)),
                     rest,
                     faint,
                     ended,
                 }
             }
-            (VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown, _) => {
+            (VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown, first) => {
                 let best = evidence.best_effect.map(|e| simulator.effects()[e].name.clone());
                 // Shares of a set that closes nothing describe only how its effects compensate for
                 // each other.
                 let together = shares.iter().map(|s| s.closes).sum();
                 let parts = shares.iter().filter(|s| s.closes >= LEAST_PART && together > 0.0);
+                // The numbers of the first candidate, which the tables show.
+                let set = first.filter(|first| !first.fits_worse() && !first.parameters.is_empty());
+                let before = set.map_or(gap.retuned, |set| set.gap_before);
                 Self::Unknown {
                     stage: worst(simulator, evidence, |s| s.excess_after),
-                    left: multiple(gap.retuned),
-                    best: best.map(|best| (best, multiple(gap.left))),
+                    left: multiple(before),
+                    best: best
+                        .map(|best| (best, set.map_or(multiple(gap.left), Candidate::leaves))),
                     parts: parts.cloned().collect(),
                     together,
                 }
@@ -294,6 +303,7 @@ impl Answer {
     pub fn probability(&self) -> Option<f64> {
         match self {
             Self::Missing { closes, .. } => Some(closes.probability),
+            Self::Partly { probability, .. } => *probability,
             _ => None,
         }
     }
@@ -317,10 +327,8 @@ impl Answer {
                 best.iter_mut().for_each(|(name, _)| *name = rename(name));
                 parts.iter_mut().for_each(|part| part.effect = rename(&part.effect));
             }
-            Self::AtBounds { otherwise, .. } | Self::TooLittle { otherwise, .. } => {
-                otherwise.rename(rename);
-            }
-            Self::WrongRecord { .. } => {}
+            Self::AtBounds { otherwise, .. } => otherwise.rename(rename),
+            Self::WrongRecord { .. } | Self::TooLittle { .. } => {}
         }
     }
 }
@@ -356,10 +364,4 @@ fn worst(
     let all = evidence.stages.iter().zip(simulator.stages());
     let worst = all.max_by(|a, b| excess(a.0).total_cmp(&excess(b.0)));
     worst.map_or(String::new(), |(_, spec)| spec.name.clone())
-}
-
-/// Returns the root mean square of a residual in multiples of the noise, from its excess (reduced
-/// chi-square minus 1).
-pub(crate) fn multiple(excess: f64) -> f64 {
-    (1.0 + excess).max(0.0).sqrt()
 }

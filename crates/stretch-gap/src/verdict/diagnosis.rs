@@ -106,6 +106,10 @@ pub struct Diagnosis {
     /// Effects that were not examined because the budget of runs was used up; none if it was not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cut_short: Option<Vec<String>>,
+    /// Effects that a first test left out, so that no set with them was fitted. Listed if the verdict
+    /// is `partial` or `unknown`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub not_fitted: Vec<String>,
     /// Names of the missing effects, the strongest first. Empty unless the verdict is `effect` or
     /// `partial`.
     pub named: Vec<String>,
@@ -238,7 +242,7 @@ impl Diagnosis {
     pub fn rename(&mut self, rename: &dyn Fn(&str) -> String) {
         let lists = [&mut self.named, &mut self.tied, &mut self.faint, &mut self.ambiguous];
         let names = lists.into_iter().flatten().chain(&mut self.not_examined);
-        let names = names.chain(self.cut_short.iter_mut().flatten());
+        let names = names.chain(self.cut_short.iter_mut().flatten()).chain(&mut self.not_fitted);
         let names = names.chain(self.candidates.iter_mut().flat_map(|c| &mut c.effects));
         let names = names.chain(self.shares.iter_mut().map(|s| &mut s.effect));
         let names = names.chain(self.stabilities.iter_mut().map(|s| &mut s.effect));

@@ -321,8 +321,6 @@ mod tests {
             (Unknown, Effect, 0)
         );
         assert_eq!(verdict.overruled, Some(Overruled::TooLittle(short)));
-        // A note below the verdict names the effects that were found.
-        assert_eq!(verdict.seen_naming.named, ["play"]);
         // An unknown cause may be the most probable only because the recording is short.
         let unknown = judged(gap, [0.2, 0.0, 0.8], |case| case.too_little = Some(short));
         assert_eq!((unknown.kind, unknown.seen), (Unknown, Unknown));

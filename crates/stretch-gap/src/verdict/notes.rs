@@ -3,6 +3,7 @@
 
 use crate::{
     evidence::{
+        candidates::multiple,
         detection_limit::DetectionLimit,
         gathered::{Evidence, StageEvidence},
         sanity::Sanity,
@@ -14,10 +15,7 @@ use crate::{
         simulator::Simulator,
         spec::{EffectSpec, StageSpec, TrialSpec},
     },
-    verdict::{
-        answer::{Answer, multiple},
-        note::Note,
-    },
+    verdict::{answer::Answer, note::Note},
 };
 
 /// Returns notes that complete the answer: that there is no test trial, that most of a channel is
@@ -31,7 +29,7 @@ pub(crate) fn answer_notes(
     let held = "there is no test trial: the last quarter of every trial is held back and tested on";
     let held = evidence.roles.borrowed_test.then(|| Note::from(held.to_owned()));
     let otherwise = match answer {
-        Answer::AtBounds { otherwise, .. } | Answer::TooLittle { otherwise, .. } => {
+        Answer::AtBounds { otherwise, .. } => {
             Some(Note::default().text("before that was seen: ").answer((**otherwise).clone()))
         }
         _ => None,
@@ -52,6 +50,47 @@ fn gross_misfit(sanity: &Sanity, simulator: &dyn Simulator) -> Option<String> {
         spec.channel,
         spec.name
     ))
+}
+
+/// Kinds of effect at the input or the output of a machine that dry friction inside it looks like.
+const LIKE_FRICTION: [&str; 5] =
+    ["backlash", "dead_zone", "hysteresis", "bouc_wen", "play_friction"];
+
+/// Returns a note if a named effect at the input or the output of a user's simulator looks like dry
+/// friction inside the machine, and the simulator declares no effect or parameter of friction.
+pub(crate) fn friction_note(simulator: &dyn Simulator, named: &[String]) -> Option<Note> {
+    let effects = simulator.effects();
+    let is_friction = |name: &str| {
+        let name = name.to_lowercase();
+        ["friction", "coulomb", "stiction", "stribeck"].iter().any(|word| name.contains(word))
+    };
+    // an effect without a kind is one that the simulator has itself
+    let own = effects
+        .iter()
+        .filter(|e| e.kind.is_none())
+        .flat_map(|e| e.parameters.iter().map(|p| p.name.to_string()).chain([e.name.clone()]));
+    let declared = simulator.parameters().iter().map(|p| p.name.clone());
+    if own.chain(declared).any(|name| is_friction(&name)) {
+        return None;
+    }
+    let looks_alike = |name: &&String| {
+        let kind = effects.iter().find(|e| e.name == **name).and_then(|e| e.kind);
+        kind.is_some_and(|kind| LIKE_FRICTION.contains(&kind.name))
+    };
+    let name = named.iter().find(looks_alike)?;
+    let text = ": dry friction inside the machine looks alike, and the simulator declares none; to compare the two, declare \
+        the friction as an effect of the simulator";
+    Some(Note::default().effect(name).text(text))
+}
+
+/// Returns a note that lists the effects that were screened and not fitted.
+pub(crate) fn not_fitted_note(names: &[String]) -> Option<Note> {
+    let listed = Note::default()
+        .text("not fitted, because a first test of each effect favoured others: ")
+        .effects(&names[..names.len().min(LISTED)], ", ");
+    let more = names.len().saturating_sub(LISTED);
+    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+    (!names.is_empty()).then(|| listed.text(rest))
 }
 
 /// Returns a note for each output with samples that [are isolated](crate::fit::isolated_outliers).

@@ -115,9 +115,12 @@ impl Diagnosis {
     }
 }
 
-/// Formats a probability for sentences.
+/// Formats a probability for sentences. One that is not certain is never rounded to 1.
 pub(crate) fn two_digits(probability: f64) -> String {
-    format!("{probability:.2}")
+    match (0.995..1.0).contains(&probability) {
+        true => "over 0.99".to_owned(),
+        false => format!("{probability:.2}"),
+    }
 }
 
 /// Returns a sentence with a small first letter, to follow a colon.
@@ -145,9 +148,14 @@ impl Answer {
         }
     }
 
-    /// Lists missing effects with their alternatives.
+    /// Lists missing effects with their alternatives. Several effects are numbered if one of them
+    /// has alternatives.
     pub fn effects_in_words(effects: &[MissingEffect]) -> String {
-        effects.iter().map(alternatives).collect::<Vec<_>>().join(" and ")
+        let words = |effect: &MissingEffect| match effect.at_bound {
+            true => format!("{} (at the end of its range)", alternatives(effect)),
+            false => alternatives(effect),
+        };
+        numbered(effects, words, " and ")
     }
 
     /// Describes the answer in plain sentences; `probability` formats a probability.
@@ -172,18 +180,33 @@ impl Answer {
                 )
             }
             Self::Missing { effects, closes, faint, ended } => {
+                let they = match (is_numbered(effects), effects.len()) {
+                    (true, _) => ". Together they close",
+                    (false, 1) => ": it closes",
+                    (false, _) => ": together they close",
+                };
                 format!(
-                    "The simulator lacks {}: {} {} of the gap on trials that were not fitted, and {}.",
+                    "The simulator lacks {}{they} {} of the gap on trials that were not fitted, and {}.",
                     Self::effects_in_words(effects),
-                    if effects.len() > 1 { "together they close" } else { "it closes" },
                     closed(closes),
                     left_with(closes, probability)
                 ) + &at_ends(ended)
                     + &also_seen(faint)
             }
-            Self::Partly { effects, closes, left, rest, faint, ended } => {
+            Self::Partly {
+                effects,
+                closes,
+                left,
+                fits_worse,
+                probability: p,
+                rest,
+                faint,
+                ended,
+            } => {
                 let much = if *closes >= MOST { "Most" } else { "A part" };
-                let names: Vec<String> = effects.iter().map(with_share).collect();
+                let probable =
+                    p.map_or(String::new(), |p| format!(" (probability {})", probability(p)));
+                let where_left = if *fits_worse { " on trials that were fitted" } else { "" };
                 let rest = rest.as_ref().map_or(String::new(), |rest| {
                     let share = match rest.share < LEAST_SHARE_IN_WORDS {
                         true => "less than 1 %".to_owned(),
@@ -194,13 +217,13 @@ impl Answer {
                         false => format!(", most of it at {}", rest.sits.join("; ")),
                     };
                     format!(
-                        " Not explained: {share} in {}{sits}; {left:.2} times the noise is left.",
+                        " Not explained: {share} in {}{sits}; {left:.2} times the noise is left{where_left}.",
                         rest.stage
                     )
                 });
-                let names = names.join(", ");
+                let names = numbered(effects, with_share, ", ");
                 format!(
-                    "{much} of the gap on trials that were not fitted is explained by {names}.{rest}"
+                    "{much} of the gap on trials that were not fitted is explained{probable} by {names}.{rest}"
                 ) + &at_ends(ended)
                     + &also_seen(faint)
             }
@@ -210,7 +233,7 @@ impl Answer {
             Self::WrongRecord { errors, corrected: Some(closes) } => {
                 sentence(errors)
                     + &format!(
-                        " With that corrected, {} of the gap close on trials that were not fitted, and {}.",
+                        " With that corrected, {} of the gap closes on trials that were not fitted, and {}.",
                         closed(closes),
                         left_with(closes, probability)
                     )
@@ -246,7 +269,7 @@ impl Answer {
                  all the same. Is it the right rig? If its parameters are right, something is missing that is not in the catalogue.",
                 parameters.join(", ")
             ),
-            Self::TooLittle { why, .. } => why.words(),
+            Self::TooLittle { why } => why.words(),
         }
     }
 }
@@ -257,7 +280,11 @@ fn closed(closes: &Closed) -> String {
     let most = if closes.left > NOT_ALL { 99.0 } else { 100.0 };
     let percent = |share: f64| (100.0 * share).round().clamp(0.0, most);
     let [low, high] = closes.interval.map(percent);
-    format!("{:.0} % ({low:.0} to {high:.0} %)", percent(closes.share))
+    let share = match (0.995..1.0).contains(&closes.share) {
+        true => "over 99 %".to_owned(),
+        false => format!("{:.0} %", percent(closes.share)),
+    };
+    if low == high { share } else { format!("{share} ({low:.0} to {high:.0} %)") }
 }
 
 /// Describes the residual that a hypothesis leaves, and its probability, which is at most 0.99 if
@@ -278,6 +305,26 @@ impl MissingEffect {
     fn is_tied(&self) -> bool {
         !self.alternatives.is_empty()
     }
+}
+
+/// Whether several effects are numbered, because one of them has alternatives.
+fn is_numbered(effects: &[MissingEffect]) -> bool {
+    effects.len() > 1 && effects.iter().any(MissingEffect::is_tied)
+}
+
+/// Lists effects in words, numbered or with a separator.
+fn numbered(
+    effects: &[MissingEffect],
+    words: impl Fn(&MissingEffect) -> String,
+    separator: &str,
+) -> String {
+    if !is_numbered(effects) {
+        return effects.iter().map(words).collect::<Vec<_>>().join(separator);
+    }
+    let all: Vec<String> =
+        (1..).zip(effects).map(|(i, effect)| format!("({i}) {}", words(effect))).collect();
+    let count = ["two", "three", "four"].get(effects.len() - 2).map_or("several", |word| *word);
+    format!("{count} effects: {}", all.join("; "))
 }
 
 /// Lists an effect and its alternatives. Alternatives that do the same are described together.

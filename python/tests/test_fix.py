@@ -168,7 +168,7 @@ def test_recordings_end_to_end_and_several_outputs():
     one = {name: np.concatenate([rows[name] for rows in seen]) for name in ("cmd_deg", "angle_deg")}
     trials = found.fix()._again.asked.spans
     assert found.fix()(inputs=one, trials=trials)["angle_deg"].shape == (1, one["cmd_deg"].size)
-    with pytest.raises(stretch_gap.StretchError, match="fix: missing a required argument: 'trials'; .* takes inputs, trials"):
+    with pytest.raises(stretch_gap.StretchError, match=r"fix: missing a required argument: 'trials'; .* takes inputs, trials"):
         found.fix()(inputs=one)
     again = stretch_gap.diagnose(found.fix(), seen, **question)
     assert again.verdict == "no_gap", again.sentence

@@ -118,7 +118,7 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     let out = predicted(&files);
     let text = String::from_utf8_lossy(&out.stdout).into_owned();
     assert!(
-        out.status.success() && text.contains("with brake the simulator predicts 1 of 1"),
+        out.status.success() && text.contains("With brake the simulator predicts 1 of 1"),
         "{text}"
     );
     let value: serde_json::Value =

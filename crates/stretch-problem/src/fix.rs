@@ -251,9 +251,14 @@ fn of_unit(unit: &str) -> String {
     if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
+/// Rounds a number to four significant digits.
+pub(crate) fn rounded(x: f64) -> f64 {
+    format!("{x:.3e}").parse().unwrap_or(x)
+}
+
 /// Writes a number with four significant digits.
 pub(crate) fn digits(x: f64) -> String {
-    let rounded = format!("{x:.3e}").parse().unwrap_or(x);
+    let rounded = rounded(x);
     if rounded != 0.0 && !(1e-3..1e6).contains(&f64::abs(rounded)) {
         format!("{rounded:e}")
     } else {

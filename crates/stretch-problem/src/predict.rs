@@ -15,6 +15,7 @@ use crate::{
     black_box::{BlackBox, Checked, ProblemSpec, Source, velocity::of_position},
     error::ProblemError,
     problem::Reading,
+    words::wrapper_in_words,
     worker::Workers,
 };
 
@@ -97,6 +98,11 @@ impl Prediction {
         self.trials.iter().flat_map(|trial| &trial.outputs)
     }
 
+    /// The effects of the fix in words, such as `backlash at the input`.
+    pub fn effects_in_words(&self) -> Vec<String> {
+        self.effects.iter().map(|name| wrapper_in_words(name)).collect()
+    }
+
     /// The result in a sentence.
     pub fn sentence(&self) -> String {
         if self.effects.is_empty() {
@@ -108,9 +114,9 @@ impl Prediction {
         }
         let better = self.outputs().filter(|o| o.ratio < 1.0).count();
         format!(
-            "with {} the simulator predicts {better} of {} outputs better than without (with re-tuned parameters): the ratio of the \
-             errors is {:.2} (geometric mean), the largest error is {:.1} times the noise",
-            self.effects.join(" and "),
+            "With {} the simulator predicts {better} of {} outputs better than without (with re-tuned parameters): the ratio of the \
+             errors is {:.2} (geometric mean), the largest root mean square error is {:.1} times the noise",
+            self.effects_in_words().join(" and "),
             self.outputs().count(),
             self.ratio,
             self.largest_times_noise,
@@ -122,7 +128,8 @@ impl Prediction {
 /// simulated on the measured inputs of the new recordings, once with the effects of the fix and once without any. In
 /// the run without effects, the parameters have the values that were re-tuned without effects (`alone` in the file).
 ///
-/// The recordings that were fitted are read as well, because the noise and the fitted ranges come from them. The new
+/// The recordings that were fitted are read as well, because the fitted ranges come from them. The noise of an output is
+/// that of the diagnosis, which the file holds. The new
 /// recordings follow the fitted ones in session time, which matters for an effect that drifts.
 ///
 /// # Errors

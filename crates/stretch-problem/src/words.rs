@@ -8,13 +8,24 @@ use stretch_sim::{RigStage, effect_named};
 /// `backlash at the output` for `output.backlash`. A name that is in no catalogue, such as that of
 /// an effect in a user's simulator, is returned unchanged.
 pub fn effect_in_words(name: &str, diagnosis: &Diagnosis) -> String {
-    let Some((place, kind)) = name.rsplit_once('.') else {
+    if !name.contains('.') {
         let is_ours = |stage: &str| RigStage::ALL.iter().any(|own| own.name() == stage);
         // a user's simulator may use the same name for another effect
         let is_ours = diagnosis.location.stages.iter().all(|s| is_ours(&s.stage));
         let own = effect_named(name).filter(|_| is_ours);
+        let of_gauge = OF_GAUGE.iter().find(|(effect, _)| *effect == name);
+        if let Some((_, title)) = of_gauge.filter(|_| is_gauge_alone(diagnosis)) {
+            return (*title).to_owned();
+        }
         return own.map_or(name, |effect| effect.title).to_owned();
-    };
+    }
+    wrapper_in_words(name)
+}
+
+/// Returns a noun phrase for an effect at a place: `backlash at the input` for `input.backlash`. Another name is returned
+/// unchanged.
+pub(crate) fn wrapper_in_words(name: &str) -> String {
+    let Some((place, kind)) = name.rsplit_once('.') else { return name.to_owned() };
     let (kind, from) = match kind.trim_end_matches(')').split_once('(') {
         Some((kind, other)) => (kind, format!(" from {other}")),
         None => (kind, String::new()),
@@ -31,11 +42,58 @@ pub fn effect_in_words(name: &str, diagnosis: &Diagnosis) -> String {
     format!("{}{from} at {place}", kind.title)
 }
 
+/// Effects of the reference, described for a gauge whose reference may be another instrument than a potentiometer.
+const OF_GAUGE: [(&str, &str); 2] = [
+    ("pot_nonlinearity", "a bend of signal against reference (in either instrument)"),
+    ("pot_backlash", "the backlash of the reference"),
+];
+
+/// Whether a gauge was diagnosed alone, so that there is neither a rig nor a simulator of one.
+fn is_gauge_alone(diagnosis: &Diagnosis) -> bool {
+    matches!(&diagnosis.location.stages[..], [stage] if stage.stage == RigStage::Sensing.name())
+        && diagnosis.parameters.iter().any(|p| p.name == "initial_state")
+}
+
+/// Returns a text about a diagnosis for display. If a gauge was diagnosed alone, the simulator is called calibration
+/// line, and the rig gauge.
+///
+/// ```
+/// use stretch_gap::Diagnosis;
+/// fn check(gauge_alone: &Diagnosis) {
+///     let text = stretch_problem::reworded("Simulator and rig agree.", gauge_alone);
+///     assert_eq!(text, "Calibration line and gauge agree.");
+/// }
+/// ```
+pub fn reworded(text: &str, diagnosis: &Diagnosis) -> String {
+    if !is_gauge_alone(diagnosis) {
+        return text.to_owned();
+    }
+    let is_end = |c: char| !(c.is_alphanumeric() || c == '_' || c == '-');
+    let word = |piece: &str| {
+        let word = piece.trim_end_matches(is_end);
+        let end = &piece[word.len()..];
+        let new = match word {
+            "simulator" => "calibration line",
+            "Simulator" => "Calibration line",
+            "rig" => "gauge",
+            _ => word,
+        };
+        format!("{new}{end}")
+    };
+    text.split_inclusive(is_end).map(word).collect()
+}
+
 /// Returns a copy of a diagnosis for display, in which effects are described in words. Computations
 /// and stored files keep the names.
 pub fn in_words(diagnosis: &Diagnosis) -> Diagnosis {
     let mut out = diagnosis.clone();
     out.rename(&|name| effect_in_words(name, diagnosis));
+    if is_gauge_alone(diagnosis) {
+        out.sentence = reworded(&out.sentence, diagnosis);
+        for note in out.notes.iter_mut().chain(&mut out.reservations) {
+            *note = reworded(&note.to_string(), diagnosis).into();
+        }
+    }
     out
 }
 

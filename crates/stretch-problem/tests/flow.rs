@@ -147,6 +147,9 @@ fn hidden_play_is_named_written_into_the_problem_and_agrees_then() {
     let wrap = ["output.backlash", "output.skew", "output.curve"];
     let found = examined(described(trials.clone(), &wrap), line);
     assert_eq!(found.diagnosis.named, ["output.backlash"], "{}", found.diagnosis.sentence);
+    let notes: Vec<String> = found.diagnosis.notes.iter().map(ToString::to_string).collect();
+    let friction = "output.backlash: dry friction inside the machine looks alike";
+    assert!(notes.iter().any(|note| note.starts_with(friction)), "{notes:?}");
     let one = &found.implementations[0];
     assert_eq!((one.name.as_str(), one.stage.as_str()), ("output.backlash", "gear"));
     assert!(
@@ -155,6 +158,9 @@ fn hidden_play_is_named_written_into_the_problem_and_agrees_then() {
         one.equation()
     );
     let (spec, text) = fixed(&found, trials);
+    // a prediction states errors in multiples of the noise of the diagnosis
+    let (noise, own) = (spec.stages[0].noise.expect("written"), found.evidence.stages[0].noise);
+    assert!((noise / own - 1.0).abs() < 1e-3, "{noise} {own}");
     assert_eq!(spec.wrapped.len(), 1);
     assert!((spec.wrapped[0].parameters["w"] - 0.4).abs() < 0.03, "{:?}", spec.wrapped);
     assert!((spec.parameters[0].value - 3.05).abs() < 0.01);

@@ -5,7 +5,7 @@ use crate::support::rows::{PROBABILITY, with_lost_rows};
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial};
 use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
-use stretch_problem::{GaugeSetup, GaugeSimulator, ProblemError};
+use stretch_problem::{GaugeSetup, GaugeSimulator, ProblemError, in_words};
 use stretch_sim::{Catalogue, GaugeRig};
 use testkit::tolerance::{FIT_WELL, GAIN_FOUND, RESUMED_S, SKEW_FOUND_S};
 
@@ -240,6 +240,10 @@ fn every_fault_is_named_or_shares_the_set_with_its_twins() {
         let shares: f64 = d.shares.iter().map(|s| s.closes).sum();
         assert_eq!(d.shares.len(), 1, "{what}");
         assert!(shares > 0.9 && shares <= 1.0 + FIT_WELL, "{what}");
+        // who calibrates a gauge has neither a simulator nor a potentiometer
+        let shown = in_words(&d).sentence;
+        assert!(shown.starts_with("The calibration line lacks "), "{shown}");
+        assert!(!shown.contains("simulator") && !shown.contains("potentiometer"), "{shown}");
     }
 }
 

@@ -17,9 +17,12 @@ use super::{
 pub fn predict_page(prediction: &Prediction) -> String {
     let mut page = Page::new(&format!("Predicted: {}", prediction.name), &prediction.sentence());
     page.facts(&[
-        ("Effects of the fix", prediction.effects.join(", ")),
+        ("Effects of the fix", prediction.effects_in_words().join(", ")),
         ("Error with the fix / without it", number(prediction.ratio, 3)),
-        ("Largest error", format!("{} times the noise", number(prediction.largest_times_noise, 3))),
+        (
+            "Largest root mean square error",
+            format!("{} times the noise", number(prediction.largest_times_noise, 3)),
+        ),
     ]);
     page.list(&prediction.notes);
     page.section(
@@ -89,6 +92,6 @@ fn traces(prediction: &Prediction, output: &PredictedOutput, window: &Range<f64>
     .legend(vec![
         (Ink::Truth, "measured".to_owned()),
         (BEFORE, "predicted without the fix".to_owned()),
-        (AFTER, format!("predicted with {}", prediction.effects.join(" and "))),
+        (AFTER, format!("predicted with {}", prediction.effects_in_words().join(" and "))),
     ])
 }

@@ -8,7 +8,7 @@ use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator, next_exper
 
 use super::{BlackBox, catalogue::Acting, spec::ProblemSpec};
 use crate::{
-    fix::{Chosen, Fix, Fixed, Meaning, NoFix},
+    fix::{Chosen, Fix, Fixed, Meaning, NoFix, rounded},
     implement::Implementation,
     problem::Diagnosable,
 };
@@ -98,6 +98,10 @@ impl Diagnosable for BlackBox {
         let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
         let mut file = self.problem.spec.clone();
         file.budget = file.budget.or(self.runs.budget().and_then(NonZeroUsize::new));
+        // a prediction and the next diagnosis use the noise of this diagnosis
+        for (stage, found) in file.stages.iter_mut().zip(&evidence.stages) {
+            stage.noise.get_or_insert(rounded(found.noise));
+        }
         let is_bare = chosen.effects(&self.description().effects).next().is_none();
         let tuned = file.parameters.iter_mut().zip(&chosen.model.parameters).enumerate();
         for (index, (parameter, value)) in tuned {

@@ -194,7 +194,8 @@ impl Workers {
 
     fn try_once(&self, asks: &[Ask<'_>]) -> Result<Vec<Result<Vec<f64>, SourceError>>, String> {
         let mut process = self.take()?;
-        let most = seconds(self.spec.deadline_s * asks.len() as f64);
+        let most =
+            (seconds(self.spec.deadline_s * asks.len() as f64), "deadline_s (s for each model)");
         // a worker that answers all stages returns the samples of each of them
         let samples: usize = asks.iter().map(|ask| self.session.samples(ask.trials)).sum();
         let bytes = (samples * self.session.stages.len() * size_of::<f64>()) as u64;
@@ -242,7 +243,7 @@ fn begin(
     session: &RecordedSession,
 ) -> Result<(Process, Hello, Vec<String>), String> {
     let mut process = Process::start(&spec.command, &spec.folder)?;
-    let most = seconds(spec.start_s);
+    let most = (seconds(spec.start_s), "start_s");
     let frame = process.exchange(message::hello(), most, NO_BODY)?;
     let hello = message::read_hello(&frame, session).map_err(|why| process.failed(&why))?;
     let frame = process.exchange(message::session(session), most, NO_BODY)?;

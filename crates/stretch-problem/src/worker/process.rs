@@ -84,11 +84,11 @@ impl Process {
     }
 
     /// Sends a frame and waits for the answer, whose body has at most `most_bytes` bytes. The error
-    /// states how the worker died, hung, or did not keep to the protocol.
+    /// states how the worker died, hung, or did not keep to the protocol. `key` of the problem's file sets the time.
     pub(super) fn exchange(
         &mut self,
         bytes: Vec<u8>,
-        most: Duration,
+        (most, key): (Duration, &str),
         most_bytes: u64,
     ) -> Result<WorkerFrame, String> {
         self.most_bytes.store(most_bytes, SeqCst);
@@ -102,7 +102,10 @@ impl Process {
             Err(RecvTimeoutError::Disconnected) => Err(self.failed("it has ended")),
             Err(RecvTimeoutError::Timeout) => {
                 self.group.kill();
-                let why = format!("it did not answer within {:.1} s", most.as_secs_f64());
+                let why = format!(
+                    "it did not answer within {:.1} s; if it needs longer, raise {key}",
+                    most.as_secs_f64()
+                );
                 Err(self.failed(&why))
             }
         }

@@ -190,6 +190,13 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
         );
         let other = load.map(|(_, name)| name);
         let label = other.map_or(kind.name.to_owned(), |other| format!("{}({other})", kind.name));
+        // What the only input of a stage adds to its output is a gain or a part of the simulator, so
+        // `all` does not include it.
+        let inputs = among.stages[site.stage].inputs.iter().map(String::as_str);
+        let is_own = kind.beside == Beside::Another
+            && site.side == Side::Output
+            && other.is_some_and(|other| inputs.eq([other]));
+        let is_usual = is_usual(kind, site, among) && !is_own;
         Placed {
             kind,
             site: site.clone(),
@@ -199,7 +206,7 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
             starts,
             beside: beside.map(|b| Arc::new(b.to_vec())),
             load: load.map(|(load, name)| (Arc::new(load.to_vec()), name.to_owned())),
-            aliases: aliases((kind, is_usual(kind, site, among)), site, among, &label),
+            aliases: aliases((kind, is_usual), site, among, &label),
         }
     };
     // columns that may cause crosstalk in a channel or load a contact

@@ -157,6 +157,18 @@ fn a_servo_alone_has_no_joint_no_profile_and_no_drifting_clock() {
     assert!(diagnosis.named.is_empty(), "{:?}: {}", diagnosis.named, diagnosis.sentence);
 }
 
+/// What the only input of a stage adds to its output is examined only if it is requested by name.
+#[test]
+fn all_has_no_crosstalk_from_the_only_input() {
+    let has_crosstalk = |wrap: &str| {
+        let checked = Checked::new(problem(recorded(|u, _| plain(u, 0.0)), &[wrap])).unwrap();
+        let source = closure(|_: &Ask<'_>| Ok(Vec::new()));
+        let bench = BlackBox::new(checked, Arc::new(source));
+        bench.description().effects.iter().any(|e| e.name == "output.crosstalk(command_V)")
+    };
+    assert!(!has_crosstalk("all") && has_crosstalk("output.crosstalk"));
+}
+
 #[test]
 #[ignore = "a diagnosis of each of 27 effects; ./ci.sh runs it"]
 fn each_hidden_effect_is_named_within_four_hundred_runs() {

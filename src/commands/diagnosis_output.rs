@@ -7,7 +7,7 @@ use stretch_data::{
     files::{Outputs, write_whole},
     listed,
 };
-use stretch_gap::{Candidate, Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
+use stretch_gap::{Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
 use stretch_problem::{ByTrial, Examined, Fixed, Implementation, effect_in_words, notation};
 use stretch_report::{
     Table, baseline_table, candidate_numbers_table, candidate_table, difference_table, run_table,
@@ -23,8 +23,6 @@ use crate::{
 
 /// Largest number of slices that are listed.
 const SLICES: usize = 8;
-/// Largest number of candidates that are listed.
-const CANDIDATES: usize = 6;
 
 /// Returns all details of a diagnosis: where the gap is, which effects explain it, how much they
 /// explain, and what to do next. With `is_verbose`, also every parameter that the data do not
@@ -144,15 +142,13 @@ fn slices(out: &mut Vec<String>, diagnosis: &Diagnosis) {
 }
 
 fn candidates(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: bool) {
-    let shown: Vec<&Candidate> =
-        diagnosis.candidates.iter().filter(|c| !c.effects.is_empty()).collect();
-    if shown.is_empty() || diagnosis.verdict == VerdictKind::NoGap {
+    let all = &diagnosis.candidates;
+    if all.is_empty() || diagnosis.verdict == VerdictKind::NoGap {
         return;
     }
-    let shown: Vec<Candidate> = shown.into_iter().take(CANDIDATES).cloned().collect();
-    put_table(out, &candidate_table(&shown));
+    put_table(out, &candidate_table(all));
     if is_verbose {
-        put_table(out, &candidate_numbers_table(&shown, &diagnosis.stabilities));
+        put_table(out, &candidate_numbers_table(all, &diagnosis.stabilities));
     }
     // The named effects form one set. Only effects outside the set are rivals; each rival may
     // replace one of the named effects.

@@ -57,12 +57,22 @@ const calibration = {
     const made = JSON.parse(await hand.call("calibrate", JSON.stringify(choices)));
     html("fitted").dataset.ms = String(Math.round(performance.now() - begun));
     calibration.tell(made);
+    calibration.converter(choices.signal);
     state.record = await hand.call("record");
     live.use(`the calibration of ${choices.reference} on ${choices.signal}`);
+    html("calibrated").classList.remove("stale");
     html("calibrated").hidden = false;
     tell.doing("judging it");
     calibration.judgement(JSON.parse(await hand.call("evaluate")));
   }),
+
+  /** A converter of 0 to 3.3 V in the unit of the signal, unless another was written. @param {string} signal */
+  converter(signal) {
+    const column = [...state.recordings.values()].flatMap((a) => a.columns).find((c) => c.name === signal);
+    const per = /** @type {Record<string, string>} */ ({ mv: "3300", uv: "3300000", "µv": "3300000" });
+    const isOurs = ["3.3", ...Object.values(per)].some((last) => input("adc").value === `12,0,${last}`);
+    if (isOurs) input("adc").value = `12,0,${per[column?.unit.toLowerCase() ?? ""] ?? "3.3"}`;
+  },
 
   /** @param {{model: string, unit: string, models: ModelRow[], notes: string[]}} made */
   tell(made) {

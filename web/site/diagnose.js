@@ -2,7 +2,7 @@
  * A diagnosis of the whole rig or of the gauge alone.
  */
 
-/** @typedef {{sentence: string, notes: string[], seconds: number, candidates: [string, number, number][], no_rig: string|null}} Told */
+/** @typedef {{sentence: string, notes: string[], seconds: number, candidates: string[][], caption: string, no_rig: string|null}} Told */
 
 const diagnosis = {
   run: () => tell.busy("preparing", async () => {
@@ -15,15 +15,15 @@ const diagnosis = {
   }),
 
   /** @param {Told} told */
-  tell({ sentence, notes, seconds, candidates, no_rig }) {
+  tell({ sentence, notes, seconds, candidates, caption, no_rig }) {
     html("sentence").textContent = sentence;
     html("sentence").dataset.seconds = String(seconds);
     tell.list("findings", notes);
-    const row = (/** @type {[string, number, number]} */ [name, probability, closed]) =>
-      [name, probability.toFixed(2), (100 * closed).toFixed(0).replace("-", "−")];
-    tell.table("candidates", candidates.slice(0, 6).map(row), 0);
+    html("candidates-caption").textContent = caption;
+    tell.table("candidates", candidates, 0);
     button("save-rig").disabled = no_rig !== null;
     html("no-rig").textContent = no_rig ? `No rig file: ${no_rig}.` : "";
+    html("diagnosed").classList.remove("stale");
     html("diagnosed").hidden = false;
   },
 

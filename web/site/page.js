@@ -14,6 +14,7 @@ const MOST_POINTS = 1500;
 const page = {
   /** @param {Map<string, File>} files Reads what was dropped beside what is there. */
   take: (files) => tell.busy("reading", async () => {
+    page.changed("calibrated", "diagnosed");
     for (const [name, file] of files) {
       state.files.set(name, file);
       crew.hands.forEach((hand) => hand.has.delete(name));
@@ -85,7 +86,10 @@ const page = {
       choice.ariaLabel = `use of ${name}`;
       choice.append(new Option("fit", "fit"), new Option("only test", "test"));
       choice.value = state.held.has(name) ? "test" : "fit";
-      choice.onchange = () => { choice.value === "test" ? state.held.add(name) : state.held.delete(name); };
+      choice.onchange = () => {
+        choice.value === "test" ? state.held.add(name) : state.held.delete(name);
+        page.changed("calibrated", "diagnosed");
+      };
       cell.append(choice);
     }
   },
@@ -116,6 +120,9 @@ const page = {
     if (rig.disabled === isRig) select("subject").value = isRig ? "rig" : "gauge";
     rig.disabled = !isRig;
   },
+
+  /** Greys results of earlier choices. @param {string[]} ids */
+  changed: (...ids) => ids.forEach((id) => html(id).classList.add("stale")),
 
   async look() {
     const [name, reference, signal] = ["shown", "reference", "signal"].map((id) => select(id).value);
@@ -235,7 +242,14 @@ const dropped = {
   button("clear").onclick = page.clear;
   button("cancel").onclick = crew.cancel;
   button("again").onclick = page.again;
-  for (const id of ["reference", "signal", "shown"]) select(id).onchange = () => { page.look().catch(tell.wrong); };
+  for (const id of ["reference", "signal", "shown"]) {
+    select(id).onchange = () => {
+      if (id !== "shown") page.changed("calibrated", "diagnosed");
+      page.look().catch(tell.wrong);
+    };
+  }
+  select("model").onchange = () => page.changed("calibrated");
+  select("subject").onchange = () => page.changed("diagnosed");
   button("calibrate").onclick = calibration.run;
   button("save-record").onclick = () => calibration.save("calibration.json", "record");
   button("save-header").onclick = () => calibration.save("stretch.h", "header", input("adc").value);
@@ -258,9 +272,9 @@ const dropped = {
     html("version").textContent = version;
     page.options("model", ["auto", ...models], "auto");
     /** @type {Record<string, string>} What a name alone does not say; a model that is not here remembers what the signal did. */
-    const words = { auto: "the model with the least error on trials left out", linear: "a line", poly13: "as published" };
+    const words = { auto: "least error on trials left out", linear: "a line", poly13: "as published" };
     for (const option of select("model").options) {
-      const rest = option.value.endsWith("+rest") ? ", and follows a baseline that drifts" : "";
+      const rest = option.value.endsWith("+rest") ? ", follows drift" : "";
       option.text = `${option.value}: ${words[option.value] ?? "with memory"}${rest}`;
     }
     html("bits").textContent = `${await first.call("sound")} calibrations were just run in this browser, with the same results, bit for bit, as in the program and on boards`;

@@ -2,15 +2,16 @@
 
 use stretch_data::listed;
 use stretch_gap::Diagnosis;
-use stretch_problem::{effect_in_words, in_words, notation};
+use stretch_problem::{effect_in_words, in_words, notation, reworded};
 use stretch_sim::Language;
 
 use super::{
     bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure, picking_figure},
     canvas::Ink,
     diagnosis_tables::{
-        baseline_table, candidate_numbers_table, candidate_table, difference_table, limit_table,
-        parameter_table, run_table, slice_table, stage_table, transfer_in_words, transfer_table,
+        baseline_table, candidate_numbers_table, candidate_table, difference_table, effects,
+        limit_table, parameter_table, probable, run_table, slice_table, stage_table,
+        transfer_in_words, transfer_table,
     },
     figure::Figure,
     first_seconds::{GIVEN, causes, facts, headline},
@@ -25,16 +26,13 @@ use super::{
     turn_figure::turn_figure,
 };
 
-/// Largest number of candidates that are drawn.
-const DRAWN: usize = 6;
-
 /// The report as one HTML file.
 pub fn diagnosis_page(subject: &Subject<'_>) -> String {
     let worded = in_words(subject.diagnosis);
     let subject = &Subject { diagnosis: &worded, ..*subject };
     let mut page = Page::new(&diagnosis_title(subject), &headline(subject));
     diagnosis_sections(&mut page, subject);
-    page.finish()
+    page.reword(|body| reworded(body, subject.diagnosis)).finish()
 }
 
 /// Title of the report.
@@ -272,7 +270,7 @@ fn slices(page: &mut Page, subject: &Subject<'_>) {
 fn named(page: &mut Page, subject: &Subject<'_>) {
     let d = subject.diagnosis;
     page.section("Which effect", "");
-    let tried: Vec<_> = d.candidates.iter().filter(|c| !c.effects.is_empty()).take(DRAWN).collect();
+    let (tried, _) = probable(&d.candidates);
     if tried.is_empty() {
         page.text(
             "No effect of the catalogue explains more than noise would: none was fitted to the end.",
@@ -282,7 +280,7 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
     page.text(
         "Every candidate is fitted together with all nominal parameters, so that none wins only because a nominal parameter is wrong.",
     );
-    let label = |c: &&stretch_gap::Candidate| c.effects.join(" + ");
+    let label = |c: &&stretch_gap::Candidate| effects(c);
     let odds: Vec<Row> = tried
         .iter()
         .map(|c| Row {

@@ -34,17 +34,37 @@ pub fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
     )
 }
 
-/// The effects of a candidate.
-fn effects(candidate: &Candidate) -> String {
+/// The effects of a candidate: `none` if nothing is missing, `unknown` for a cause outside the catalogue.
+pub(crate) fn effects(candidate: &Candidate) -> String {
     match candidate.effects.as_slice() {
         [] => "none".to_owned(),
-        effects => effects.join(", "),
+        effects => effects.join(" + "),
     }
 }
 
-/// A table of every candidate with its probability and the share of the gap that it closes.
+/// Whether a candidate is a set of effects, and neither nothing nor a cause outside the catalogue.
+fn is_set(candidate: &Candidate) -> bool {
+    !candidate.parameters.is_empty()
+}
+
+/// Probability below which a set of effects is not listed.
+const LEAST_PROBABILITY: f64 = 0.005;
+
+/// Returns the candidates to list, the most probable first, and the number of those that are left out because their
+/// probability is below 0.5 %. Nothing and unknown are always listed.
+pub(crate) fn probable(candidates: &[Candidate]) -> (Vec<&Candidate>, usize) {
+    let is_listed = |c: &&Candidate| !is_set(c) || c.probability >= LEAST_PROBABILITY;
+    let mut listed: Vec<&Candidate> = candidates.iter().filter(is_listed).collect();
+    listed.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+    let others = candidates.len() - listed.len();
+    (listed, others)
+}
+
+/// A table of the candidates with their probabilities and the shares of the gap that they close, the most probable
+/// first. Sets of effects below 0.5 % are counted in the caption.
 pub fn candidate_table(candidates: &[Candidate]) -> Table {
-    let row = |c: &Candidate| {
+    let (listed, others) = probable(candidates);
+    let row = |c: &&Candidate| {
         vec![
             effects(c),
             fixed(c.probability, 3),
@@ -54,13 +74,22 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
             interval(c.closed_ci, percent),
         ]
     };
+    let others = match others {
+        0 => String::new(),
+        1 => "; 1 other is below 0.5 %".to_owned(),
+        n => format!("; {n} others are below 0.5 %"),
+    };
+    let caption = format!(
+        "Candidates, the most probable first (none: nothing is missing; unknown: a cause outside the catalogue): probability given \
+         this catalogue; what is left before and after in multiples of the noise, all channels with a gap together; the share that \
+         closes on trials that were not fitted{others}"
+    );
     Table::new(
-        "Candidates, the most probable set first, nothing and unknown last: probability given this catalogue; what is left before \
-         and after in multiples of the noise, all channels with a gap together; the share that closes on trials that were not fitted",
+        caption,
         &["Effects", "Probability", "Left before", "Left after", "Closes", "95 % interval"],
-        candidates.iter().map(row),
+        listed.iter().map(row),
     )
-    .highlight((!candidates.is_empty()).then_some(0))
+    .highlight((!listed.is_empty()).then_some(0))
 }
 
 /// A table of the fitted numbers, with one row per effect of each candidate, and of the stability of the effect. Sets
@@ -69,14 +98,15 @@ pub fn candidate_numbers_table(candidates: &[Candidate], stabilities: &[EffectSt
     let value = |p: &EffectValue| {
         let unit = shown_unit(&p.unit);
         let sd = with_unit(&number(p.sd, 2), unit);
-        format!("{} = {} \u{b1} {sd}", p.name, number(p.value, 3))
+        let end = if p.at_bound { " (at the end of its range)" } else { "" };
+        format!("{} = {} \u{b1} {sd}{end}", p.name, number(p.value, 3))
     };
     let stability = |effect: &String| {
         let known = stabilities.iter().find(|s| s.effect == *effect);
         known.map_or_else(|| NONE.to_owned(), |s| fixed(s.stability, 2))
     };
     // the candidates for no effect and for an unknown effect have no numbers
-    let own = (1..).zip(candidates).filter(|(_, c)| !c.parameters.is_empty());
+    let own = (1..).zip(probable(candidates).0).filter(|(_, c)| is_set(c));
     let rows = own.flat_map(|(set, c)| {
         c.effects.iter().map(move |effect| {
             let own = c.parameters.iter().filter(|p| p.effect == *effect);

@@ -6,7 +6,7 @@ use stretch_gap::{Answer, Diagnosis, Gross, ParameterShift, VerdictKind};
 use stretch_problem::effect_in_words;
 
 use super::{
-    markup::{multiple, number, percent, shown_unit, with_unit},
+    markup::{fixed, multiple, number, percent, shown_unit, with_unit},
     subject::Subject,
 };
 
@@ -58,13 +58,13 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         let [low, high] = c.closed_ci.map(percent);
         let interval = if low == high { String::new() } else { format!(" ({low} to {high})") };
         let fitted = match c.fits_worse() {
-            true => format!(", {} times on those that were", number(multiple(c.left), 3)),
+            true => format!(", {} times on those that were", fixed(c.leaves(), 2)),
             false => String::new(),
         };
         format!(
             "{} of the gap closes on trials that were not fitted{interval}: {} times the noise is left{fitted}.",
             percent(c.closed),
-            number(multiple(c.gap_after), 3)
+            fixed(multiple(c.gap_after), 2)
         )
     });
     let place = d

@@ -66,7 +66,7 @@ impl Page {
     pub fn part(&mut self, id: &str, title: &str, verdict: &str) -> &mut Self {
         self.close();
         self.put(&format!(
-            "<header class=\"part\" id=\"{}\"><h1>{}</h1>\n<p class=\"verdict\">{}</p></header>\n",
+            "<header class=\"part\" id=\"{}\"><h2>{}</h2>\n<p class=\"verdict\">{}</p></header>\n",
             escape(id),
             escape(title),
             escape(verdict)
@@ -194,6 +194,12 @@ impl Page {
         self.put(&format!("<details><summary>{}</summary>\n", escape(summary)));
         content(self);
         self.put("</details>\n")
+    }
+
+    /// Returns the page with other words in its title and body.
+    #[must_use]
+    pub(crate) fn reword(self, words: impl Fn(&str) -> String) -> Self {
+        Self { title: words(&self.title), body: words(&self.body), ..self }
     }
 
     /// Returns the whole file, HTML that is also well-formed XML.

@@ -443,7 +443,7 @@ fn a_part_closes_what_stands_before_it() {
     page.section("A", "").part("second", "Second", "Two & three.").section("B", "");
     let names = elements(&page.finish());
     let count = |name: &str| names.iter().filter(|n| *n == name).count();
-    assert_eq!(["h1", "h2", "header", "section"].map(count), [2; 4]);
+    assert_eq!(["h1", "h2", "header", "section"].map(count), [1, 3, 2, 2]);
 }
 
 #[test]
@@ -481,4 +481,45 @@ fn rows_of_a_wide_table_carry_their_heads_to_a_phone() {
     elements(&html);
     assert!(html.contains("<table class=\"cards\""));
     assert!(html.contains("<td class=\"words\" data-head=\"&lt;d&gt;\">a cell of words"));
+}
+
+/// Nothing and unknown are always listed, the most probable answer comes first, and sets below 0.5 % are counted.
+#[test]
+fn every_probable_answer_has_its_row() {
+    let value = stretch_gap::EffectValue {
+        effect: "a".into(),
+        name: "c".into(),
+        unit: "1".into(),
+        value: 0.6,
+        sd: 0.1,
+        interval: [0.4, 0.6],
+        is_form: false,
+        at_bound: true,
+    };
+    let candidate = |effects: &[&str], probability: f64| stretch_gap::Candidate {
+        effects: effects.iter().map(|e| (*e).to_owned()).collect(),
+        probability,
+        score: 1.0,
+        gap_before: 3.0,
+        gap_after: 0.0,
+        left: 0.0,
+        at_bound: false,
+        closed: 1.0,
+        closed_ci: [1.0, 1.0],
+        is_confirmed: true,
+        by_name: Default::default(),
+        parameters: effects.iter().filter(|e| **e != "unknown").map(|_| value.clone()).collect(),
+    };
+    let mut all = vec![candidate(&["a", "b"], 0.144), candidate(&["a"], 0.239)];
+    all.extend((0..7).map(|_| candidate(&["b"], 0.001)));
+    all.extend([candidate(&[], 0.002), candidate(&["unknown"], 0.608)]);
+    let table = crate::candidate_table(&all);
+    let firsts: Vec<&str> = table.rows.iter().map(|row| row[0].as_str()).collect();
+    assert_eq!(firsts, ["unknown", "a", "a + b", "none"]);
+    assert_eq!((table.rows[0][1].as_str(), table.highlight), ("0.608", Some(0)));
+    assert!(table.caption.ends_with("; 7 others are below 0.5 %"), "{}", table.caption);
+    // sets have the numbers of their rows, and a strength at the end of its range is marked
+    let numbers = crate::candidate_numbers_table(&all, &[]);
+    assert_eq!([&numbers.rows[0][0], &numbers.rows[0][1]], ["a", "2"]);
+    assert!(numbers.rows[0][3].contains("(at the end of its range)"), "{:?}", numbers.rows[0]);
 }

@@ -5,7 +5,7 @@ use stretch_gap::Options;
 use stretch_problem::{
     Examined, GaugeSetup, GaugeSimulator, Problem, RigSession, RigSetup, RigSimulator, in_words,
 };
-use stretch_report::{Subject, diagnosis_page};
+use stretch_report::{Subject, Table, candidate_table, diagnosis_page};
 use stretch_sim::{Catalogue, GaugeRig, Rig};
 use wasm_bindgen::prelude::*;
 
@@ -46,8 +46,9 @@ pub(crate) struct Told {
     sentence: String,
     notes: Vec<String>,
     seconds: f64,
-    /// Candidates, each with its probability and the share of the gap that it closes.
-    candidates: Vec<(String, f64, f64)>,
+    /// The report's table of candidates.
+    candidates: Vec<Vec<String>>,
+    caption: String,
     /// The reason why no rig file can be written.
     no_rig: Option<String>,
 }
@@ -64,9 +65,10 @@ impl Found {
 
     pub(crate) fn told(&self) -> Told {
         let diagnosis = in_words(&self.examined.diagnosis);
-        let one = |c: &stretch_gap::Candidate| (c.effects.join(" and "), c.probability, c.closed);
+        let Table { rows, caption, .. } = candidate_table(&diagnosis.candidates);
         Told {
-            candidates: diagnosis.candidates.iter().map(one).collect(),
+            candidates: rows,
+            caption,
             sentence: diagnosis.sentence,
             notes: diagnosis.notes.into_iter().map(String::from).collect(),
             seconds: self.examined.diagnosis.runtime_s,

@@ -63,12 +63,12 @@ pub fn fixed(x: f64, decimals: usize) -> String {
 ///
 /// ```
 /// use stretch_report::percent;
-/// assert_eq!([0.004, 0.42, 0.996, 1.0].map(percent), ["0.4\u{a0}%", "42\u{a0}%", "over 99\u{a0}%", "100\u{a0}%"]);
+/// assert_eq!([0.004, 0.42, 0.996, 1.0].map(percent), ["0.4\u{a0}%", "42\u{a0}%", ">\u{a0}99\u{a0}%", "100\u{a0}%"]);
 /// ```
 pub fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     if (99.5..100.0 - 1e-9).contains(&percent) {
-        return "over 99\u{a0}%".to_owned();
+        return ">\u{a0}99\u{a0}%".to_owned();
     }
     let digits = match percent.abs() < 0.95 {
         true => number((10.0 * percent).round() / 10.0, 1),

@@ -1,6 +1,6 @@
 //! `stretch evaluate`: measures the errors of a calibration on trials with a reference.
 
-use std::{fmt::Display, path::PathBuf};
+use std::{fmt::Display, ops::Range, path::PathBuf};
 
 use anyhow::ensure;
 use stretch_calibrate::{
@@ -84,7 +84,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         let named: Vec<_> = one.iter().map(|(name, c)| (name.as_str(), c)).collect();
         let evaluation = evaluate(&named, &trials)?;
         evaluation_doubts(&named, &trials, &evaluation).iter().for_each(|doubt| tell(doubt));
-        return args.json.answer(&evaluation, || print(&evaluation, named.len() + 1));
+        return args.json.answer(&evaluation, || print(&evaluation, 1..named.len() + 1));
     }
     let named: Vec<_> = several.iter().map(|(name, c)| (name.as_str(), &**c)).collect();
     let evaluation = evaluate_arrays(&named, &trials)?;
@@ -96,7 +96,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         }
     }
     array_doubts(&named, &trials, &evaluation).iter().for_each(|doubt| tell(doubt));
-    args.json.answer(&evaluation, || print(&evaluation, named.len()))
+    args.json.answer(&evaluation, || print(&evaluation, 0..named.len()))
 }
 
 /// Returns the columns of the gauges of a calibration, and of its reference.
@@ -153,19 +153,19 @@ pub(super) fn table_of_errors(title: &str, methods: &[MethodErrors], unit: &str)
     table_text(&method_table(title, methods, &names, unit))
 }
 
-/// Largest number of methods, with the raw signal, that are shown without `-v`.
+/// Largest number of methods that are shown without `-v`.
 const MOST_SHOWN: usize = 9;
 
-/// Prints the error of the best of the first `compared` methods as a sentence, and the table of all trials. With `-v`,
-/// also prints a table for each trial, and tests whether the methods differ.
-fn print(evaluation: &Evaluation, compared: usize) -> anyhow::Result<()> {
+/// Prints the error of the best of the compared methods as a sentence, and the table of all trials. `compared` is the
+/// range of the calibrations: the raw signal comes before it, the single gauges of a sleeve after it. With `-v`, also
+/// prints a table for each trial, and tests whether the methods differ.
+fn print(evaluation: &Evaluation, compared: Range<usize>) -> anyhow::Result<()> {
     let Evaluation { unit, trials, pooled, comparisons } = evaluation;
-    let count = compared.saturating_sub(1);
-    let name = |i: usize| match (count, &pooled[i].method) {
+    let name = |i: usize| match (compared.len(), &pooled[i].method) {
         (0 | 1, method) => method.clone(),
         (count, method) => format!("{method}, the best of {count},"),
     };
-    if let Some(errors) = errors_in_words(&pooled[..compared], unit, name) {
+    if let Some(errors) = errors_in_words(&pooled[..compared.end], unit, name) {
         say_first(errors)?;
     }
     let mut blocks = Vec::new();
@@ -179,8 +179,7 @@ fn print(evaluation: &Evaluation, compared: usize) -> anyhow::Result<()> {
     };
     let mut shown = pooled.clone();
     if !is_verbose() && pooled.len() > MOST_SHOWN {
-        // The raw signal stays first, and the gauges of a sleeve last.
-        shown[1..compared].sort_by(|a, b| a.rmse.total_cmp(&b.rmse));
+        shown[compared].sort_by(|a, b| a.rmse.total_cmp(&b.rmse));
         shown.truncate(MOST_SHOWN);
     }
     blocks.push(table_of_errors(title, &shown, unit));

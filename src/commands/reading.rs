@@ -4,7 +4,9 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 use stretch_data::{DataError, DataSet, Split, Trial};
-use stretch_recording::{ReadOptions, Recording, RecordingError, TimeColumn, is_format_note, tidy_column};
+use stretch_recording::{
+    ReadOptions, Recording, RecordingError, TimeColumn, is_format_note, tidy_column,
+};
 
 use super::shared::progress;
 use crate::display::{detail, warn};

@@ -458,7 +458,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         let models = choice.as_ref().map(|choice| blocks_of_models(choice, &options.reference));
         let (sentence, tested) = match &choice {
             None => (judged, None),
-            Some(choice) => (chosen(choice, &ranking), (!test.is_empty()).then_some(judged)),
+            Some(choice) => (choice_in_words(choice, &ranking), (!test.is_empty()).then_some(judged)),
         };
         say_first(sentence)?;
         let fits = blocks_of_calibration(&calibrated, &ranking, choice.is_some());
@@ -471,7 +471,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 }
 
 /// Returns the sentence with the chosen model, and the signal if that was chosen as well.
-fn chosen(choice: &ModelChoice, ranking: &[Candidate]) -> String {
+fn choice_in_words(choice: &ModelChoice, ranking: &[Candidate]) -> String {
     let signal = ranking.first().map_or(String::new(), |best| {
         format!("signal {}, the best of {}; ", best.signal, ranking.len())
     });

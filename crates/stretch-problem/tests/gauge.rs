@@ -4,7 +4,9 @@ use crate::support::Noise;
 use crate::support::rows::{PROBABILITY, with_lost_rows};
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial};
-use stretch_gap::{Diagnosis, Options, Simulator, VerdictKind, diagnose, next_experiment};
+use stretch_gap::{
+    Diagnosis, Laboratory, Options, Simulator, VerdictKind, diagnose, next_experiment,
+};
 use stretch_problem::{GaugeSetup, GaugeSimulator, ProblemError, in_words};
 use stretch_sim::{Catalogue, GaugeRig};
 use testkit::tolerance::{FIT_WELL, GAIN_FOUND, RESUMED_S, SKEW_FOUND_S};
@@ -299,6 +301,27 @@ fn twins_that_no_motion_parts_call_for_gauge_blocks() {
     assert_eq!(next.next.name, "gauge_blocks", "{:?}", next.experiments);
     let set = next.trial.channel("set_rod_mm").expect("a course");
     assert!(set.iter().all(|x| (115.0..165.0).contains(x)));
+}
+
+/// A recording that is ten times as slow as the others.
+#[test]
+fn no_experiment_moves_faster_than_the_recording() {
+    let mut trials = trials(Fault::None, 0.0, 3, 5);
+    for trial in &mut trials {
+        trial.start_s *= 10.0;
+        trial.trial.time_s.iter_mut().for_each(|t| *t *= 10.0);
+    }
+    let gauge = GaugeSimulator::new(&setup(&trials, &Catalogue::default())).expect("a gauge");
+    let fastest = |values: &[f64]| {
+        values.windows(2).map(|pair| (pair[1] - pair[0]).abs() / (10.0 * DT_S)).fold(0.0, f64::max)
+    };
+    let rod = |trial: &Trial, name: &str| fastest(trial.channel(name).expect("a column"));
+    let recorded = trials.iter().map(|t| rod(&t.trial, "rod_mm")).fold(0.0, f64::max);
+    for (plan, _) in gauge.experiments() {
+        // A motion takes a whole number of samples, so that its rate may be some percent higher.
+        let proposed = rod(&plan.trial, "set_rod_mm");
+        assert!(proposed < 1.05 * recorded, "{}: {proposed}, not {recorded}", plan.name);
+    }
 }
 
 #[test]

@@ -1,17 +1,21 @@
 //! Candidate experiments on a gauge alone, and the signal that a model predicts for each.
 
 use stretch_data::{Channel, Trial};
-use stretch_gap::{GapError, Laboratory, Model, Plan};
+use stretch_gap::{GapError, Laboratory, Model, Plan, TrialSpec};
 use stretch_sim::{Gauge, RigStage, Start};
 
 use super::GaugeSimulator;
 use crate::{
     bench::{
         acting::unrecorded,
-        courses::{Points, begin, course, loops, moving},
+        courses::{Points, begin, course, loops, moving, paced},
     },
+    black_box::velocity::of_position,
     error::ProblemError,
 };
+
+/// Greatest length of an experiment if the first trial is not longer, s.
+const LONGEST_S: f64 = 120.0;
 
 /// An experiment on a gauge: the time course of e, which is the reference as a share of its range.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,12 +25,6 @@ pub struct Course {
     is_known: bool,
     /// Applied pressure as a share of its range; 0 if none is applied.
     pressure: Vec<f64>,
-}
-
-/// A course without pressure; `is_known` states whether blocks of known length replace the reference.
-fn held(points: &[(f64, f64)], is_known: bool, dt_s: f64) -> Course {
-    let e: Vec<f64> = course(points, dt_s).collect();
-    Course { pressure: vec![0.0; e.len()], e, is_known }
 }
 
 /// The gauge held in the middle while the pressure goes up and down.
@@ -82,6 +80,19 @@ impl GaugeSimulator {
         Ok(vec![signal])
     }
 
+    /// A course without pressure, in which the reference moves no faster than it was recorded; `is_known` states whether
+    /// blocks of known length replace the reference.
+    fn held(&self, points: &[(f64, f64)], is_known: bool) -> Course {
+        let (session, dt_s) = (&self.session, self.session.dt_s);
+        let rates = of_position(&session.reference, &TrialSpec::ranges(&session.trials), dt_s);
+        let rates = session.fitted().flat_map(|range| &rates[range]);
+        let fastest = rates.fold(0.0, |a: f64, rate| a.max(rate.abs()));
+        let points = paced(points, self.nominal.spec.span.abs() / fastest);
+        let most = self.inputs[0].values.len().max((LONGEST_S / dt_s) as usize);
+        let e: Vec<f64> = course(&points, dt_s).take(most).collect();
+        Course { pressure: vec![0.0; e.len()], e, is_known }
+    }
+
     fn reference_of(&self, course: &Course) -> Vec<f64> {
         course.e.iter().map(|e| self.nominal.spec.zero + self.nominal.spec.span * e).collect()
     }
@@ -122,7 +133,7 @@ impl Laboratory for GaugeSimulator {
         let moving =
             moving().into_iter().map(|(name, how, points)| (name, how, 0.25, points, false));
         let all = moving.chain(still()).map(|(name, how, prepare_min, points, is_known)| {
-            self.experiment((name, how), prepare_min, held(&points, is_known, dt_s))
+            self.experiment((name, how), prepare_min, self.held(&points, is_known))
         });
         let mut candidates: Vec<(Plan, Course)> = all.collect();
         if !self.session.pressure.is_empty() {

@@ -29,10 +29,11 @@ use crate::{
 ///
 /// Writes time_s, the estimate, its rate, the branch and the domain, one line per
 /// sample. If there is no estimate (the rate estimator warms up, a sample is
-/// missing), the numbers are empty and the column domain gives the reason. Inputs
-/// outside the calibrated domain are clamped, and the column domain shows it. The
-/// models linear and curve need no rate: they give estimates from the first sample
-/// on, with an empty rate at first.
+/// missing), the numbers are empty and the column domain gives the reason. A row whose
+/// signal is empty or nan is left out, with a note. Inputs outside the calibrated
+/// domain are clamped, and the column domain shows it. The models linear and curve
+/// need no rate: they give estimates from the first sample on, with an empty rate at
+/// first.
 ///
 /// From standard input each line gets its estimate immediately; a malformed line is
 /// reported on standard error and skipped:

@@ -114,7 +114,9 @@ fn the_samples_of_a_fit_are_inside_its_range() {
     for kind in [Memory::Observer, Memory::History] {
         let calibration = calibrate(&trials, &options(kind, false)).unwrap().calibration;
         let evaluation = evaluate(&[("x", &calibration)], &trials).unwrap();
-        assert_eq!(evaluation.pooled[1].clamped, 0, "{kind}");
+        // The first samples of a trial, in which the memory settles, are not fitted.
+        let most = if kind == Memory::Observer { 0 } else { trials.len() as u64 };
+        assert!(evaluation.pooled[1].clamped <= most, "{kind}: {}", evaluation.pooled[1].clamped);
     }
 }
 

@@ -107,7 +107,13 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
             &[],
         ),
         ("metres.csv", metres, evaluate, &["does not belong to that calibration"], &[]),
-        ("millivolts.csv", millivolts.clone(), files, &[outside], &["put on again", "does not belong"]),
+        (
+            "millivolts.csv",
+            millivolts.clone(),
+            files,
+            &[outside],
+            &["put on again", "does not belong"],
+        ),
         ("millivolts.csv", millivolts, all, &["are they in mV?"], &[]),
         (
             "fast.csv",

@@ -24,7 +24,6 @@ use crate::{
     problem::{
         altered_parameters::Altered,
         error::{GapError, if_possible},
-        sample_roles::SampleRoles,
         simulator::Simulator,
     },
     record::{
@@ -101,11 +100,7 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     let begun = Stopwatch::start();
     let simulator = task.simulator;
     let columns = columns_alone(&simulator.columns(), simulator.trials(), simulator.dt_s());
-    // On a recording that is too short, no effect is named, so none is examined.
-    let about = simulator.description();
-    let is_sufficient =
-        too_little(&SampleRoles::of(simulator)?, about.rows_used(), about.dt_s).is_none();
-    let examines_effects = task.examines_effects && columns.is_empty() && is_sufficient;
+    let examines_effects = task.examines_effects && columns.is_empty();
     let task = Task { examines_effects, ..task };
     let between_rows = command_timing::between_rows(simulator);
     let (problem, from) = prepare(task, between_rows.as_ref())?;

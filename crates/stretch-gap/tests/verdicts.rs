@@ -214,17 +214,15 @@ fn the_null_band_narrows_with_the_record() {
     assert!((short / other - 1.0).abs() < 1e-6, "{short} {other}");
 }
 
-/// If a recording has only a tenth of the required rows and seconds, no effect is simulated or suggested, and the
-/// sentence says what to record.
+/// If a recording has only a tenth of the required rows and seconds, no effect is named or suggested, and the sentence
+/// says what to record.
 #[test]
 fn a_record_that_is_too_short_carries_no_name() {
     let trials = vec![(400, false), (300, true)];
-    let long = line().hiding(&[(Effect::Quadratic, &[0.2])]);
-    let most = told(&long.measured(14)).simulations / 4;
-    let toy = Toy { trials, ..long };
+    let toy = Toy { trials, ..line().hiding(&[(Effect::Quadratic, &[0.2])]) };
     for seed in 14..20 {
         let told = told(&toy.measured(seed));
-        assert!(told.named.is_empty() && told.simulations < most, "{}", told.simulations);
+        assert!(told.named.is_empty(), "{:?}", told.named);
         assert!(told.notes.iter().all(|note| !note.to_string().contains("quadratic")));
         assert!(told.sentence.contains("Record at least"), "{}", told.sentence);
     }

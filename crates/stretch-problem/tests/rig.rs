@@ -205,7 +205,7 @@ fn bad_input_is_refused_in_a_sentence() {
     let shut = refused(&|t| t.trial.channels[..2].iter_mut().for_each(|c| c.values.fill(0.0)));
     assert!(shut.contains("no valve ever opens"), "{shut}");
     let tests = refused(&|t| t.split = Split::Test);
-    assert!(tests.contains("split"), "{tests}");
+    assert!(tests.contains("not a test trial"), "{tests}");
     let ragged = each("bridge_v", &|v| v.truncate(40));
     assert!(ragged.contains("trial_0.csv, column bridge_v: it has 40 values"), "{ragged}");
     let hole = each("bridge_v", &|v| v[40] = f64::NAN);

@@ -227,7 +227,7 @@ fn another_version_is_named_and_other_spellings_are_refused() {
     for body in [
         "S1,01,2,3,4,I,0",
         "S1,+1,2,3,4,I,0",
-        "S1,1,2,3,4,I,4",
+        "S1,1,2,3,4,I,5",
         "S1,1,2,3,4,W,0",
         "S1,1,2,3,4,I,0,",
         "S1,1,2",

@@ -143,7 +143,7 @@ fn alone(
 ) -> Result<ArrayCalibration<MAX_CHANNELS>, CalibrateError> {
     let mut spec = calibration.spec().clone();
     let mut gains = spec.alone[k].clone();
-    gains.terms = std::iter::once(gains.terms[k].clone()).collect();
+    gains.terms = std::iter::once(gains.terms[k]).collect();
     let mut channel = spec.channels[k].clone();
     channel.follows = Values::new("follows", &[0.0])?;
     channel.possible = Interval { min: -MOST, max: MOST };

@@ -220,8 +220,8 @@ impl Prior {
             false => [e.rmse_new, e.half_width_95_new],
         };
         // Allow 1 %, because the duration is computed from a measured sample rate.
-        let reached = self.expected.iter().filter(|e| e.seconds <= 1.01 * seconds).map(of);
-        reached.filter(|[rmse, _]| rmse.is_some()).last().unwrap_or([None; 2])
+        let mut reached = self.expected.iter().filter(|e| e.seconds <= 1.01 * seconds).map(of);
+        reached.rfind(|[rmse, _]| rmse.is_some()).unwrap_or([None; 2])
     }
 
     /// Returns the variance of the normalised target for a root mean square error in the reference's unit.

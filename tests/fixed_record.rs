@@ -136,7 +136,7 @@ fn what_has_no_form_in_integers_says_so_and_writes_nothing() {
         (&["--model", "history"], plain, ["the history model", "observer"]),
         (&["--rate", "tracker:0.1"], plain, ["Tracker", "savgol:WINDOW,DEGREE"]),
         (plain, &["--adc", "12,0,1"], ["between 1.2", "measures from 0 to 1"]),
-        (plain, &["--adc", "12,0,1000000"], ["cannot be converted to integers", "fixed.error"]),
+        (plain, &["--adc", "12,0,1000000"], ["has only 0.0 codes", "not the board's converter"]),
     ] {
         runs(calibrate(&trial, &float).args(fitted));
         let before = scratch.names();

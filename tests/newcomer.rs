@@ -69,7 +69,7 @@ fn a_gauge_in_another_unit_is_told_by_its_power_of_ten() {
     let output = command.args(["apply", "--calibration"]).arg(&record).write_stdin(live).output();
     let said = one_line(&String::from_utf8(output.unwrap().stderr).unwrap());
     assert!(
-        said.contains(says) && said.contains("3000 samples: 0 without an estimate"),
+        said.contains(says) && said.contains("3000 samples: 10 without an estimate"),
         "live: {said}"
     );
     assert!(!said.contains("the zero has shifted"), "live: {said}");

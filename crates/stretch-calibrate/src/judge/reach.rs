@@ -130,20 +130,20 @@ impl Reach {
         )
     }
 
-    /// Returns the power of ten that brings most samples inside, with their number. If several powers do so, because the
-    /// range contains zero, it is the one that makes the samples about as wide as the range and belongs to a unit; `None`
-    /// if there is none.
+    /// Returns the power of ten that brings most samples inside, with their number; `None` if there is none. The power
+    /// must belong to a unit, or make the samples about as wide as the range: a shifted signal may come inside by
+    /// chance. If several powers bring them inside, because the range contains zero, it must do both.
     fn best_power(&self) -> Option<(i32, u64)> {
         let brings = POWERS.zip(self.inside).filter(|(_, inside)| 2 * inside > self.samples);
         let brings: Vec<(i32, u64)> = brings.collect();
-        let is_as_wide = |(power, _): &&(i32, u64)| {
-            let share = (self.seen.max - self.seen.min) * ten_to(*power) / self.range.span();
-            let is_unit = power % 3 == 0 || in_other_unit(&self.unit, *power).is_some();
-            is_unit && (share.log10() * 2.0).abs() <= 1.0
+        let is_unit = |power: i32| power % 3 == 0 || in_other_unit(&self.unit, power).is_some();
+        let is_as_wide = |power: i32| {
+            let share = (self.seen.max - self.seen.min) * ten_to(power) / self.range.span();
+            (share.log10() * 2.0).abs() <= 1.0
         };
         match &brings[..] {
-            [one] => Some(*one),
-            several => several.iter().find(is_as_wide).copied(),
+            [one] => Some(*one).filter(|(power, _)| is_unit(*power) || is_as_wide(*power)),
+            several => several.iter().copied().find(|(p, _)| is_unit(*p) && is_as_wide(*p)),
         }
     }
 }

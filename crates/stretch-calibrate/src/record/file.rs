@@ -149,10 +149,12 @@ fn other_kind(text: &str) -> Option<&'static str> {
     let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
     let first = first?;
     if !first.starts_with('{') {
-        let is_section = first.starts_with('[') && first.ends_with(']');
-        return match is_section || first.contains(" = ") {
-            true => Some("a TOML file, such as a simulator or a problem,"),
-            false => Some("a text file, such as a recording (CSV),"),
+        let section = first.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
+        let is_section = section.is_some_and(|name| name.contains(|c: char| c.is_alphabetic()));
+        return match (is_section || first.contains(" = "), first.contains([',', ';', '\t'])) {
+            (true, _) => Some("a TOML file, such as a simulator or a problem,"),
+            (false, true) => Some("a text file, such as a recording (CSV),"),
+            (false, false) => None,
         };
     }
     let value: serde_json::Value = serde_json::from_str(text).ok()?;

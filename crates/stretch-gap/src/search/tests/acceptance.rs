@@ -74,9 +74,15 @@ fn a_strong_effect_is_worth_it_and_the_same_set_is_not() {
     let is_accepted = |base, next| worth.is_accepted(base, next).expect("simulated");
     assert!(is_accepted(&problem.nominal, &play));
     assert!(!is_accepted(&play, &play) && !is_accepted(&play, &problem.nominal));
-    // The gap of the stage is closed completely, so no further effect can exceed model discrepancy.
-    assert!(worth.is_possible(&problem.nominal, index(&record, "cubic")));
-    assert!(!worth.is_possible(&play, index(&record, "cubic")));
+    // A set that leaves an octave at twice the noise has room for a further effect, and one that
+    // leaves noise alone has not.
+    let cubic = index(&record, "cubic");
+    assert!(worth.is_possible(&problem.nominal, cubic));
+    let mut quiet = play.clone();
+    for misfit in &mut quiet.misfits {
+        misfit.octaves = misfit.octaves.at_most_noise();
+    }
+    assert!(!worth.is_possible(&quiet, cubic));
 }
 
 /// An effect that closes less than `null_excess` needs a larger rise of the score.

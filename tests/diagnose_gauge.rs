@@ -69,8 +69,10 @@ fn a_gauge_is_told_by_columns_rig_file_or_missing_openings() {
     let skew = d["candidates"][0]["parameters"]["skew_s"].as_f64().unwrap();
     assert_abs_diff_eq!(skew, 0.12, epsilon = SKEW_FOUND_S);
     assert_eq!(d["shares"][0]["effect"], "channel_skew");
+    assert!(d["sentence"].as_str().unwrap().starts_with("The calibration line lacks"));
     let page = without_program(&fs::read_to_string(page).unwrap());
     assert!(page.contains("channel_skew") && page.contains("deg") && !page.contains("NaN"));
+    assert!(page.contains("calibration line against gauge") && !page.contains("simulator"));
     // A data set whose rig file describes a gauge, with named columns. The default columns need not
     // be named.
     let set = folder(&scratch, "kind", "time_s,angle_deg,s2", Some(GAUGE));

@@ -220,11 +220,8 @@ fn a_problem_of_the_built_in_gauge_is_its_data_set() {
     let text = "[simulator]\nbuiltin = \"gauge\"\ndata_set = \"rod.csv\"\nreference = \"rod_mm\"\nsignal = \"s1\"\n";
     fs::write(folder.path().join("problem.toml"), text).unwrap();
     let (is_good, text) = said(folder.path(), &[]);
-    assert!(
-        is_good
-            && text.starts_with("The simulator lacks the time offset between bridge and length"),
-        "{text}"
-    );
+    let begin = "The calibration line lacks the time offset between bridge and length";
+    assert!(is_good && text.starts_with(begin), "{text}");
 }
 
 /// A folder as received from another user: recordings, and a problem whose simulator leaves a file

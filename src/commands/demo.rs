@@ -319,7 +319,7 @@ fn print(sessions: &Sessions, job: &Job, result: &str) -> anyhow::Result<()> {
     let tested = format!("On {} that no fit has seen", trials(sessions.test.len()));
     say(table_of_errors(&tested, &evaluation.pooled, &evaluation.unit))?;
     if is_verbose() {
-        say("\nWhy simulator and rig disagree:")?;
+        say("\nWhy simulation and recording disagree:")?;
         print_diagnosis(&job.examined)?;
     }
     Ok(())

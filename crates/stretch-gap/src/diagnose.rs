@@ -473,7 +473,7 @@ fn report(
     let mut reservations: Vec<Note> =
         implausible_noise_notes(cause.problem, &sanity).into_iter().map(Note::from).collect();
     if cause.problem.is_held {
-        let held = "the re-tuned parameters could not be simulated over all trials, so the simulator without effects keeps the last \
+        let held = "the re-tuned parameters could not be simulated over all trials, so the model without effects keeps the last \
             parameters that could";
         reservations.push(Note::from(held.to_owned()));
     }
@@ -523,6 +523,7 @@ fn report(
     let mut diagnosis = Diagnosis {
         schema: 1,
         verdict: judged.kind,
+        gauge_alone: simulator.record().gauge_alone,
         answer: Some(answer),
         sentence: String::new(),
         not_examined,

@@ -42,7 +42,7 @@ pub use problem::{
     description::{Description, DescriptionSpec},
     error::GapError,
     noise::{Noise, WINDOW, noise_variance},
-    record_facts::{Motion, MotionSpec, RecordFacts, Recorded, RowsUsed},
+    record_facts::{Motion, MotionSpec, RecordFacts, Recorded, RowsUsed, nouns},
     sample_roles::{BLOCK_S, Role, SampleRoles, Segment},
     simulator::{Model, ModelRuns, Run, Simulator},
     spec::{EffectSpec, ParameterSpec, SlowDrift, StageSpec, TrialSpec},

@@ -216,7 +216,7 @@ fn a_factor_beyond_sensors_is_told_of_the_simulator() {
         approx::assert_relative_eq!(gross.factor.expect("a factor"), factor, max_relative = 0.1);
         assert!(
             told.sentence
-                .starts_with("Simulator and recording differ by a factor: the simulator's y0 is ")
+                .starts_with("Simulation and recording differ by a factor: the simulated y0 is ")
         );
         assert_eq!(gross.units, None, "`u` is no unit that is known");
     }

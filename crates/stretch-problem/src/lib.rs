@@ -41,4 +41,4 @@ pub use sensors::sensors;
 pub use stretch_data::EffectEntry;
 pub use stretch_effects::{KINDS, Kind, Language, Side, kind_named};
 pub use stretch_sim::Tolerance;
-pub use words::{effect_in_words, in_words, notation, reworded};
+pub use words::{effect_in_words, in_words, notation};

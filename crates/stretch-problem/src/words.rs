@@ -14,7 +14,7 @@ pub fn effect_in_words(name: &str, diagnosis: &Diagnosis) -> String {
         let is_ours = diagnosis.location.stages.iter().all(|s| is_ours(&s.stage));
         let own = effect_named(name).filter(|_| is_ours);
         let of_gauge = OF_GAUGE.iter().find(|(effect, _)| *effect == name);
-        if let Some((_, title)) = of_gauge.filter(|_| is_gauge_alone(diagnosis)) {
+        if let Some((_, title)) = of_gauge.filter(|_| diagnosis.gauge_alone) {
             return (*title).to_owned();
         }
         return own.map_or(name, |effect| effect.title).to_owned();
@@ -48,52 +48,11 @@ const OF_GAUGE: [(&str, &str); 2] = [
     ("pot_backlash", "the backlash of the reference"),
 ];
 
-/// Whether a gauge was diagnosed alone, so that there is neither a rig nor a simulator of one.
-fn is_gauge_alone(diagnosis: &Diagnosis) -> bool {
-    matches!(&diagnosis.location.stages[..], [stage] if stage.stage == RigStage::Sensing.name())
-        && diagnosis.parameters.iter().any(|p| p.name == "initial_state")
-}
-
-/// Returns a text about a diagnosis for display. If a gauge was diagnosed alone, the simulator is called calibration
-/// line, and the rig gauge.
-///
-/// ```
-/// use stretch_gap::Diagnosis;
-/// fn check(gauge_alone: &Diagnosis) {
-///     let text = stretch_problem::reworded("Simulator and rig agree.", gauge_alone);
-///     assert_eq!(text, "Calibration line and gauge agree.");
-/// }
-/// ```
-pub fn reworded(text: &str, diagnosis: &Diagnosis) -> String {
-    if !is_gauge_alone(diagnosis) {
-        return text.to_owned();
-    }
-    let is_end = |c: char| !(c.is_alphanumeric() || c == '_' || c == '-');
-    let word = |piece: &str| {
-        let word = piece.trim_end_matches(is_end);
-        let end = &piece[word.len()..];
-        let new = match word {
-            "simulator" => "calibration line",
-            "Simulator" => "Calibration line",
-            "rig" => "gauge",
-            _ => word,
-        };
-        format!("{new}{end}")
-    };
-    text.split_inclusive(is_end).map(word).collect()
-}
-
 /// Returns a copy of a diagnosis for display, in which effects are described in words. Computations
 /// and stored files keep the names.
 pub fn in_words(diagnosis: &Diagnosis) -> Diagnosis {
     let mut out = diagnosis.clone();
     out.rename(&|name| effect_in_words(name, diagnosis));
-    if is_gauge_alone(diagnosis) {
-        out.sentence = reworded(&out.sentence, diagnosis);
-        for note in out.notes.iter_mut().chain(&mut out.reservations) {
-            *note = reworded(&note.to_string(), diagnosis).into();
-        }
-    }
     out
 }
 

@@ -244,7 +244,9 @@ fn every_fault_is_named_or_shares_the_set_with_its_twins() {
         assert!(shares > 0.9 && shares <= 1.0 + FIT_WELL, "{what}");
         // who calibrates a gauge has neither a simulator nor a potentiometer
         let shown = in_words(&d).sentence;
-        assert!(shown.starts_with("The calibration line lacks "), "{shown}");
+        for told in [&d.sentence, &shown] {
+            assert!(told.starts_with("The calibration line lacks "), "{told}");
+        }
         assert!(!shown.contains("simulator") && !shown.contains("potentiometer"), "{shown}");
     }
 }

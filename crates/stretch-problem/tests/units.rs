@@ -79,7 +79,7 @@ fn other_units_are_told_by_their_names() {
         let told = told(unit, ratio, [0.03, 0.1]);
         assert_eq!(told.verdict, VerdictKind::Record, "{units}: {}", told.sentence);
         assert_eq!(told.gross[0].units.as_deref(), Some(units), "{}", told.sentence);
-        let begins = "Simulator and recording differ by a factor: the simulator's output is ";
+        let begins = "Simulation and recording differ by a factor: the simulated output is ";
         assert!(told.sentence.starts_with(begins), "{}", told.sentence);
         // the parameters have tolerances already
         assert!(!told.sentence.contains("tolerances"), "{}", told.sentence);
@@ -94,7 +94,7 @@ fn a_factor_beside_parameters_without_tolerance_is_told_as_a_factor() {
         let told = told("rad/s", ratio, [0.0, 0.0]);
         assert_eq!(told.verdict, VerdictKind::Record, "{}", told.sentence);
         let begins =
-            format!("Simulator and recording differ by a factor: the simulator's output is {says}");
+            format!("Simulation and recording differ by a factor: the simulated output is {says}");
         assert!(told.sentence.starts_with(&begins[..begins.len() - 1]), "{}", told.sentence);
         assert!(told.sentence.contains("tolerances"), "{}", told.sentence);
     }

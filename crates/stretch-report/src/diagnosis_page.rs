@@ -1,8 +1,8 @@
 //! The report of a diagnosis: the correction of the simulator, its probability, and its gain.
 
 use stretch_data::listed;
-use stretch_gap::Diagnosis;
-use stretch_problem::{effect_in_words, in_words, notation, reworded};
+use stretch_gap::{Diagnosis, nouns};
+use stretch_problem::{effect_in_words, in_words, notation};
 use stretch_sim::Language;
 
 use super::{
@@ -32,12 +32,13 @@ pub fn diagnosis_page(subject: &Subject<'_>) -> String {
     let subject = &Subject { diagnosis: &worded, ..*subject };
     let mut page = Page::new(&diagnosis_title(subject), &headline(subject));
     diagnosis_sections(&mut page, subject);
-    page.reword(|body| reworded(body, subject.diagnosis)).finish()
+    page.finish()
 }
 
 /// Title of the report.
 pub(crate) fn diagnosis_title(subject: &Subject<'_>) -> String {
-    format!("{}: simulator against rig", subject.name)
+    let [simulator, rig] = nouns(subject.diagnosis.gauge_alone);
+    format!("{}: {simulator} against {rig}", subject.name)
 }
 
 /// Adds the sections of the report to a page, which may have other parts.
@@ -85,7 +86,7 @@ fn agreeing(page: &mut Page, subject: &Subject<'_>) {
     let Some(by_trial) = subject.by_trial else { return };
     page.section(
         "Do the runs agree?",
-        "Every run is fitted by itself, with the named effects. If a value differs between runs by more than its intervals, the rig or the load was another one, or an effect is missing.",
+        "Every run is fitted by itself, with the named effects. If a value differs between runs by more than its intervals, the hardware or the load was another one, or an effect is missing.",
     );
     page.list(&by_trial.sentences());
     page.table(&difference_table(by_trial));
@@ -100,7 +101,7 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
     page.section(
         "Measured against simulated",
         "The stage with the largest gap, driven by its measured input, on the test trial where it is farthest \
-         off. The noise is what no simulator could remove.",
+         off. The noise is what no model could remove.",
     );
     if let Some(shown) = shown(subject, stage) {
         let (top, _) = trace_figures(subject, stage, &shown);
@@ -367,7 +368,7 @@ fn gained(page: &mut Page, subject: &Subject<'_>) {
     if let Some(transfer) = &d.transfer {
         page.table(&transfer_table(transfer));
         page.text(
-            "What the gap costs a user: a calibration trained in the simulator and applied to measured trials, next to \
+            "What the gap costs a user: a calibration trained on simulated trials and applied to measured trials, next to \
              one trained on measured trials.",
         );
         if let Some(words) = transfer_in_words(transfer) {

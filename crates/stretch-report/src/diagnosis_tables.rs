@@ -146,7 +146,7 @@ pub fn transfer_table(transfer: &Transfer) -> Table {
     });
     Table::new(
         "Error on measured test trials, % of full scale, by where the calibration was trained",
-        &["Calibration", "Measured trials", "Simulator, re-tuned", "Simulator with the effect"],
+        &["Calibration", "Measured trials", "Simulated, re-tuned", "Simulated with the effect"],
         rows,
     )
 }
@@ -200,7 +200,7 @@ pub fn limit_table(limits: &[DetectionLimit]) -> Table {
     };
     Table::new(
         "Detection limits: the strength at which each effect would be named on these data with probability 0.9, \
-         the simulator being right otherwise",
+         if nothing else is missing",
         &["Effect", "Parameter", "Limit"],
         limits.iter().map(row),
     )
@@ -274,7 +274,7 @@ pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
         .collect();
     (!worse.is_empty()).then(|| {
         format!(
-            "Trained with the effect, the {} calibration does worse here although the simulator is closer to the rig: a \
+            "Trained with the effect, the {} calibration does worse here although the simulation is closer to the recording: a \
              calibration without memory cannot hold what the effect does. It learns the mean of it over the training \
              motion, which is not that of the test motion; the wrong parameters that stood in for the effect happened to \
              be nearer.",

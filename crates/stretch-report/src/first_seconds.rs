@@ -2,7 +2,7 @@
 //! it brings, and the next step.
 
 use stretch_data::listed;
-use stretch_gap::{Answer, Diagnosis, Gross, ParameterShift, VerdictKind};
+use stretch_gap::{Answer, Diagnosis, Gross, ParameterShift, VerdictKind, nouns};
 use stretch_problem::effect_in_words;
 
 use super::{
@@ -16,7 +16,9 @@ pub(crate) fn headline(subject: &Subject<'_>) -> String {
     let d = subject.diagnosis;
     match &d.answer {
         Some(Answer::Missing { effects, .. }) => {
-            format!("{}The simulator lacks {}.", d.preface(), Answer::effects_in_words(effects))
+            let [simulator, _] = nouns(d.gauge_alone);
+            let lacking = Answer::effects_in_words(effects);
+            format!("{}The {simulator} lacks {lacking}.", d.preface())
         }
         // a probability holds only among the candidates, so the text adds this condition
         _ => d.in_sentences(&|p| format!("{} {GIVEN}", percent(p))).replace(" %", "\u{a0}%"),
@@ -47,7 +49,7 @@ fn to_do(d: &Diagnosis) -> String {
             format!("{now} {experiment}")
         }
         (Some(experiment), _) => experiment,
-        (None, _) => now.to_owned(),
+        (None, _) => now,
     }
 }
 
@@ -121,7 +123,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
             )
         }
         (VerdictKind::Record, _) => {
-            "The columns alone show this, whatever the simulator is.".to_owned()
+            "The columns alone show this, whatever was simulated.".to_owned()
         }
         (VerdictKind::Unknown, _) => {
             "There is certainly a gap; the effects of the catalogue explain at most a part of it."
@@ -147,7 +149,7 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
             )
         }
         VerdictKind::Parameters => "The whole gap closes by re-tuning.".to_owned(),
-        VerdictKind::NoGap => "The simulator can be used as it is.".to_owned(),
+        VerdictKind::NoGap => format!("The {} can be used as it is.", nouns(d.gauge_alone)[0]),
     };
     vec![
         ("What to change", fix),
@@ -162,7 +164,7 @@ fn cheaper(d: &Diagnosis) -> String {
     let poly13 = d.transfer.as_ref().map(|t| t.poly13);
     match poly13.filter(|e| e.sim_with_effect < 0.9 * e.sim) {
         Some(e) => format!(
-            " A non-linear calibration trained in the simulator then has an error of {} instead of {} of full scale.",
+            " A non-linear calibration trained on simulated trials then has an error of {} instead of {} of full scale.",
             percent(0.01 * e.sim_with_effect),
             percent(0.01 * e.sim)
         ),

@@ -196,12 +196,6 @@ impl Page {
         self.put("</details>\n")
     }
 
-    /// Returns the page with other words in its title and body.
-    #[must_use]
-    pub(crate) fn reword(self, words: impl Fn(&str) -> String) -> Self {
-        Self { title: words(&self.title), body: words(&self.body), ..self }
-    }
-
     /// Returns the whole file, HTML that is also well-formed XML.
     pub fn finish(mut self) -> String {
         self.close();

@@ -86,7 +86,7 @@ impl Identified {
     ///     like: vec![],
     ///     at_bound: false,
     /// };
-    /// assert_eq!(gear.sentence().unwrap(), "gear has no influence in these data: the simulator ignores it, or nothing excites it");
+    /// assert_eq!(gear.sentence().unwrap(), "gear has no influence in these data: the simulation ignores it, or nothing excites it");
     /// ```
     pub fn sentence(&self) -> Option<String> {
         let name = &self.name;
@@ -94,7 +94,7 @@ impl Identified {
         let mut said = match self.knowledge {
             Knowledge::Dead => {
                 return Some(format!(
-                    "{name} has no influence in these data: the simulator ignores it, or nothing excites it"
+                    "{name} has no influence in these data: the simulation ignores it, or nothing excites it"
                 ));
             }
             _ if !self.like.is_empty() => {

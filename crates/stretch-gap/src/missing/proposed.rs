@@ -239,7 +239,7 @@ pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
         (true, _) => {
             let course = proposed.course.map(|c| format!(": {} in {channel}", c.words(unit)));
             format!(
-                "No term that was tried explains what is left in {stage}{}. The cause may act inside the simulator's equations (friction, a limit of the speed), or not depend on what was recorded.",
+                "No term that was tried explains what is left in {stage}{}. The cause may act inside the simulated equations (friction, a limit of the speed), or not depend on what was recorded.",
                 course.unwrap_or_default()
             )
         }

@@ -71,6 +71,16 @@ impl MotionSpec {
     }
 }
 
+/// Returns the nouns of sentences for the simulator and for the machine that was recorded.
+///
+/// ```
+/// assert_eq!(stretch_gap::nouns(false), ["simulator", "rig"]);
+/// assert_eq!(stretch_gap::nouns(true), ["calibration line", "gauge"]);
+/// ```
+pub const fn nouns(gauge_alone: bool) -> [&'static str; 2] {
+    if gauge_alone { ["calibration line", "gauge"] } else { ["simulator", "rig"] }
+}
+
 /// Facts about a recording in addition to a [`DescriptionSpec`](crate::DescriptionSpec); empty by
 /// default.
 ///
@@ -100,6 +110,8 @@ pub struct RecordFacts {
     /// Flags of samples that were not measured. These samples are ignored, whatever their value.
     /// Empty if all samples were measured.
     pub is_lost: Vec<bool>,
+    /// Whether a gauge was recorded alone, so that there is neither a rig nor a simulator of one.
+    pub gauge_alone: bool,
     /// Number of rows of the recording in the trials, and number of rows that were read; `None` if
     /// every row that was read is a sample of a trial.
     pub rows_used: Option<RowsUsed>,
@@ -136,6 +148,7 @@ impl Default for RecordFacts {
     fn default() -> Self {
         Self {
             is_lost: Vec::new(),
+            gauge_alone: false,
             rows_used: None,
             motion: None,
             signals: Vec::new(),

@@ -6,6 +6,7 @@ use stretch_effects::{EffectParameter, Role};
 
 use crate::problem::{
     column::{Column, Distortion},
+    record_facts::nouns,
     simulator::Simulator,
     spec::EffectSpec,
 };
@@ -58,6 +59,7 @@ impl Fault {
         let mut all: Vec<Self> =
             columns.iter().enumerate().flat_map(|(i, column)| Self::of_column(i, column)).collect();
         let stages = simulator.stages();
+        let [model, _] = nouns(simulator.record().gauge_alone);
         for (p, spec) in simulator.parameters().iter().enumerate() {
             // A factor on a nominal value of 0 would have no effect.
             if spec.sd > 0.0 && spec.nominal != 0.0 {
@@ -66,7 +68,7 @@ impl Fault {
                     kind: Kind::Parameter(p),
                     column: None,
                     touches: (0..stages.len()).filter(acts).collect(),
-                    name: format!("{} of the simulator", spec.name),
+                    name: format!("{} of the {model}", spec.name),
                     unit: "1".into(),
                     range: FACTORS,
                     base: 1.0,

@@ -2,7 +2,7 @@
 
 use crate::{
     fit::hypothesis::Hypothesis,
-    problem::{column::Column, simulator::Simulator},
+    problem::{column::Column, record_facts::nouns, simulator::Simulator},
     record::{
         fault::Kind,
         gross::{Gross, GrossKind},
@@ -82,18 +82,16 @@ impl Gross {
     /// Creates the error that simulator and recording of an output differ by a factor, because of
     /// other units, or because no parameter of the simulator may change (`is_exact`).
     fn of_factor(column: &Column<'_>, factor: f64, units: Option<String>, is_exact: bool) -> Self {
-        let or = if is_exact { ", or give the parameters of the simulator tolerances" } else { "" };
+        let or = if is_exact { ", or give the parameters tolerances" } else { "" };
         let that_is = units.as_ref().map_or(String::new(), |units| format!(": that is {units}"));
         let ratio = short(1.0 / factor);
         Self {
             factor: Some(factor),
             sentence: format!(
-                "the simulator's {} is {ratio} times the recording's{that_is}",
+                "the simulated {} is {ratio} times the recording's{that_is}",
                 column.name
             ),
-            hint: format!(
-                "let the simulator answer in the unit of the recording, or convert the recording{or}"
-            ),
+            hint: format!("simulate in the unit of the recording, or convert the recording{or}"),
             units,
             ..Self::of_column(GrossKind::Factor, column)
         }
@@ -103,6 +101,7 @@ impl Gross {
     pub(crate) fn found(suspect: &Suspect<'_>, hypothesis: &Hypothesis) -> Option<Self> {
         let (fault, size) = suspect.error_of(&hypothesis.model)?;
         if let Kind::Parameter(p) = fault.kind {
+            let [simulator, rig] = nouns(suspect.description().record().gauge_alone);
             let spec = &suspect.description().parameters[p];
             let value = hypothesis.model.parameters[p] * (1.0 + size);
             let unit = if spec.unit == "1" { String::new() } else { format!(" {}", spec.unit) };
@@ -113,12 +112,14 @@ impl Gross {
                 found: Some(value),
                 unit: spec.unit.clone(),
                 sentence: format!(
-                    "{} is {}{unit} on the rig, and {} in the simulator",
+                    "{} is {}{unit} on the {rig}, and {} in the {simulator}",
                     spec.name,
                     short(value),
                     short(spec.nominal)
                 ),
-                hint: "correct the parameter of the simulator, or the setting of the rig".into(),
+                hint: format!(
+                    "correct the parameter of the {simulator}, or the setting of the {rig}"
+                ),
                 ..Self::of(GrossKind::Parameter)
             });
         }
@@ -188,7 +189,7 @@ fn short(x: f64) -> String {
 }
 
 /// Returns one sentence with the first error, its alternatives, and what a user should check.
-pub(crate) fn sentence(gross: &[Gross]) -> String {
+pub(crate) fn sentence(gross: &[Gross], [simulator, rig]: [&str; 2]) -> String {
     let Some(first) = gross.first() else { return String::new() };
     let rest: Vec<&str> = gross[1..].iter().map(|g| g.sentence.as_str()).collect();
     let other = match (rest.is_empty(), first.is_plain()) {
@@ -197,8 +198,8 @@ pub(crate) fn sentence(gross: &[Gross]) -> String {
         (false, false) => format!(" (or {}: these data cannot tell)", rest.join(", or ")),
     };
     let wrong = match first.what {
-        GrossKind::Parameter => "A parameter of the simulator does not fit the rig",
-        GrossKind::Factor => "Simulator and recording differ by a factor",
+        GrossKind::Parameter => &format!("A parameter of the {simulator} does not fit the {rig}"),
+        GrossKind::Factor => "Simulation and recording differ by a factor",
         _ => "The recording is wrong",
     };
     format!("{wrong}: {}{other}; {}.", first.sentence, first.hint)

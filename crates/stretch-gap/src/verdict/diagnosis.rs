@@ -95,6 +95,10 @@ pub struct Diagnosis {
     pub schema: u32,
     /// The kind of answer.
     pub verdict: VerdictKind,
+    /// Whether a gauge was diagnosed alone, so that there is neither a rig nor a simulator of one; left
+    /// out if not.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub gauge_alone: bool,
     /// The answer with its numbers; none if an older version wrote the diagnosis.
     #[serde(default)]
     pub answer: Option<Answer>,

@@ -24,7 +24,7 @@ pub struct Note(Vec<Piece>);
 enum Piece {
     Text(String),
     Effect(String),
-    Answer(Answer),
+    Answer(Answer, [&'static str; 2]),
 }
 
 impl Note {
@@ -49,9 +49,9 @@ impl Note {
         })
     }
 
-    /// Appends an answer.
-    pub(crate) fn answer(self, answer: Answer) -> Self {
-        self.and(Piece::Answer(answer))
+    /// Appends an answer in which simulator and machine have these nouns.
+    pub(crate) fn answer(self, answer: Answer, nouns: [&'static str; 2]) -> Self {
+        self.and(Piece::Answer(answer, nouns))
     }
 
     fn and(mut self, piece: Piece) -> Self {
@@ -65,7 +65,7 @@ impl Note {
             match piece {
                 Piece::Text(_) => {}
                 Piece::Effect(name) => *name = rename(name),
-                Piece::Answer(answer) => answer.rename(rename),
+                Piece::Answer(answer, _) => answer.rename(rename),
             }
         }
     }
@@ -75,7 +75,7 @@ impl fmt::Display for Note {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.0.iter().try_for_each(|piece| match piece {
             Piece::Text(text) | Piece::Effect(text) => f.write_str(text),
-            Piece::Answer(answer) => f.write_str(&answer.in_sentences(&two_digits)),
+            Piece::Answer(answer, nouns) => f.write_str(&answer.in_sentences(*nouns, &two_digits)),
         })
     }
 }

@@ -10,6 +10,7 @@ use crate::{
     },
     fit::{metric::Metric, prepared::PreparedProblem, swing::Swing},
     problem::{
+        record_facts::nouns,
         runs::Runs,
         sample_roles::{Role, SampleRoles},
         simulator::Simulator,
@@ -28,24 +29,28 @@ pub(crate) fn answer_notes(
 ) -> Vec<Note> {
     let held = "there is no test trial: the last quarter of every trial is held back and tested on";
     let held = evidence.roles.borrowed_test.then(|| Note::from(held.to_owned()));
+    let nouns = nouns(simulator.record().gauge_alone);
+    let seen = || Note::default().text("before that was seen: ");
     let otherwise = match answer {
-        Answer::AtBounds { otherwise, .. } => {
-            Some(Note::default().text("before that was seen: ").answer((**otherwise).clone()))
-        }
+        Answer::AtBounds { otherwise, .. } => Some(seen().answer((**otherwise).clone(), nouns)),
         _ => None,
     };
-    let gross = gross_misfit(sanity, simulator).map(Note::from);
+    let gross = gross_misfit(sanity, simulator, nouns).map(Note::from);
     held.into_iter().chain(gross).chain(otherwise).collect()
 }
 
 /// Returns a warning if most of a channel is not simulated, because effects might be named for the
 /// wrong rig.
-fn gross_misfit(sanity: &Sanity, simulator: &dyn Simulator) -> Option<String> {
+fn gross_misfit(
+    sanity: &Sanity,
+    simulator: &dyn Simulator,
+    [model, rig]: [&str; 2],
+) -> Option<String> {
     let left = sanity.left.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
     let (stage, share) = left.filter(|(_, share)| **share > sanity.allowed)?;
     let spec = &simulator.stages()[stage];
     Some(format!(
-        "{:.0} % of what {} does is not in the simulator of {}: is it the right rig, and is every column what its name says?",
+        "{:.0} % of what {} does is not in the {model} of {}: is it the right {rig}, and is every column what its name says?",
         100.0 * share.min(1.0),
         spec.channel,
         spec.name
@@ -141,7 +146,7 @@ pub(crate) fn implausible_noise_notes(
         let spec = &problem.simulator().stages()[*stage];
         let noise = &problem.compare.metrics[*stage].noise;
         format!(
-            "the noise of {} is implausible, {:.2e} {} ({}): even without an effect the simulator \
+            "the noise of {} is implausible, {:.2e} {} ({}): even without an effect the simulation \
              leaves only {share:.2} of it, so the true noise is smaller, and the assumed noise hides every gap of its size; state the \
              true noise of the stage",
             spec.channel, noise.rms, spec.unit, noise.source
@@ -223,6 +228,7 @@ const AT_BEGINNING: f64 = 0.5;
 /// simulator may start from another state than the rig.
 pub(crate) fn start_notes(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<String> {
     let trials = TrialSpec::ranges(simulator.trials());
+    let [model, rig] = nouns(simulator.record().gauge_alone);
     let note = |(spec, traces): (&StageSpec, &StageEvidence)| {
         let excess = |samples: &[f64]| -> f64 {
             samples.iter().filter(|r| r.is_finite()).map(|r| r * r - 1.0).sum()
@@ -235,8 +241,8 @@ pub(crate) fn start_notes(simulator: &dyn Simulator, evidence: &Evidence) -> Vec
         let share = early / whole;
         (whole > 0.0 && share > AT_BEGINNING).then(|| {
             format!(
-                "{:.0} % of the gap in {} is in the first tenth of the recordings: check that the simulator starts from the state in which \
-                 the rig was at the first sample",
+                "{:.0} % of the gap in {} is in the first tenth of the recordings: check that the {model} starts from the state in which \
+                 the {rig} was at the first sample",
                 100.0 * share.min(1.0),
                 spec.channel
             )

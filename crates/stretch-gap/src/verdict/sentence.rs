@@ -1,6 +1,7 @@
 //! The answer of a diagnosis in words.
 
 use crate::{
+    problem::record_facts::nouns,
     record::sentence::sentence,
     verdict::{
         answer::{Answer, Closed, MissingEffect},
@@ -36,7 +37,7 @@ impl Diagnosis {
     pub fn in_sentences(&self, probability: &dyn Fn(f64) -> String) -> String {
         let Some(answer) = &self.answer else { return self.sentence.clone() };
         let proposed = self.proposed.as_ref().map_or(String::new(), |p| format!(" {}", p.sentence));
-        self.preface() + &answer.in_sentences(probability) + &proposed
+        self.preface() + &answer.in_sentences(nouns(self.gauge_alone), probability) + &proposed
     }
 
     /// Returns what to do next, in a sentence; empty for a diagnosis without an
@@ -48,8 +49,9 @@ impl Diagnosis {
     ///     assert_eq!(tied.next_step(), "Run an experiment that tells them apart before you build on one.");
     /// }
     /// ```
-    pub fn next_step(&self) -> &'static str {
-        match &self.answer {
+    pub fn next_step(&self) -> String {
+        let [simulator, _] = nouns(self.gauge_alone);
+        let step = match &self.answer {
             None => "",
             Some(Answer::Agrees { .. }) => "Nothing has to change.",
             Some(Answer::Retuned { .. }) => "Set the re-tuned parameters, then diagnose again.",
@@ -59,23 +61,22 @@ impl Diagnosis {
             Some(answer) if answer.effects().iter().any(MissingEffect::is_tied) => {
                 "Run an experiment that tells them apart before you build on one."
             }
-            Some(answer) if answer.effects().len() == 1 => {
-                "Add it to the simulator, then diagnose again."
-            }
-            Some(Answer::Missing { .. } | Answer::Partly { .. }) => {
-                "Add them to the simulator, then diagnose again."
+            Some(Answer::Missing { effects, .. } | Answer::Partly { effects, .. }) => {
+                let them = if effects.len() == 1 { "it" } else { "them" };
+                &format!("Add {them} to the {simulator}, then diagnose again.")
             }
             Some(Answer::WrongRecord { .. }) => "Correct this error, then diagnose again.",
             Some(Answer::Unknown { .. })
                 if self.proposed.as_ref().is_some_and(|p| !p.equation.is_empty()) =>
             {
-                "Add the proposed term to the simulator, then diagnose again."
+                &format!("Add the proposed term to the {simulator}, then diagnose again.")
             }
-            Some(Answer::Unknown { .. } | Answer::AtBounds { .. }) => {
-                "Look where most is left, and add to the simulator what happens there as an effect of its own."
-            }
+            Some(Answer::Unknown { .. } | Answer::AtBounds { .. }) => &format!(
+                "Look where most is left, and add to the {simulator} what happens there as an effect of its own."
+            ),
             Some(Answer::TooLittle { .. }) => "Record more, then diagnose again.",
-        }
+        };
+        step.to_owned()
     }
 
     /// Returns the sentences of a diagnosis. The next step is added if the sentences do not already
@@ -88,7 +89,7 @@ impl Diagnosis {
                 | Answer::Missing { .. }
                 | Answer::Partly { .. }
                 | Answer::Unknown { .. },
-            ) => format!("{finding} Next: {}", decapitalised(self.next_step())),
+            ) => format!("{finding} Next: {}", decapitalised(&self.next_step())),
             _ => finding,
         }
     }
@@ -125,8 +126,8 @@ pub(crate) fn two_digits(probability: f64) -> String {
 
 /// Returns a sentence with a small first letter, to follow a colon.
 fn decapitalised(sentence: &str) -> String {
-    let mut letters = sentence.chars();
-    letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
+    let (first, rest) = sentence.split_at(1);
+    first.to_lowercase() + rest
 }
 
 /// Lists the first names, and the number of further ones.
@@ -158,15 +159,22 @@ impl Answer {
         numbered(effects, words, " and ")
     }
 
-    /// Describes the answer in plain sentences; `probability` formats a probability.
-    pub fn in_sentences(&self, probability: &dyn Fn(f64) -> String) -> String {
+    /// Describes the answer in plain sentences with the [nouns] for simulator and machine;
+    /// `probability` formats a probability.
+    pub fn in_sentences(
+        &self,
+        [simulator, rig]: [&str; 2],
+        probability: &dyn Fn(f64) -> String,
+    ) -> String {
         match self {
             Self::Agrees { small } => {
-                "Simulator and rig agree within the noise.".to_owned() + &too_small(small)
+                let (first, rest) = simulator.split_at(1);
+                let begin = first.to_uppercase() + rest;
+                format!("{begin} and {rig} agree within the noise.") + &too_small(small)
             }
             Self::Retuned { shipped, left, small } => {
                 format!(
-                    "No effect is missing: with its parameters re-tuned within their tolerances the simulator agrees with the rig (what is left is {shipped:.1} times the noise as shipped, {left:.2} re-tuned)."
+                    "No effect is missing: with its parameters re-tuned within their tolerances the {simulator} agrees with the {rig} (what is left is {shipped:.1} times the noise as shipped, {left:.2} re-tuned)."
                 ) + &too_small(small)
             }
             Self::Faint { left, noise, stage, small } => {
@@ -175,7 +183,7 @@ impl Answer {
                     false => format!("Found, and too small to matter: {}; ", small.join(", ")),
                 };
                 format!(
-                    "{found}with its parameters re-tuned the simulator leaves {left:.3} times the noise, most of it in {stage}. Noise as it is described \
+                    "{found}with its parameters re-tuned the {simulator} leaves {left:.3} times the noise, most of it in {stage}. Noise as it is described \
                      stays below {noise:.3} in 19 of 20 recordings like this one: it is larger, or something is missing."
                 )
             }
@@ -186,7 +194,7 @@ impl Answer {
                     (false, _) => ": together they close",
                 };
                 format!(
-                    "The simulator lacks {}{they} {} of the gap on trials that were not fitted, and {}.",
+                    "The {simulator} lacks {}{they} {} of the gap on trials that were not fitted, and {}.",
                     Self::effects_in_words(effects),
                     closed(closes),
                     left_with(closes, probability)
@@ -228,10 +236,11 @@ impl Answer {
                     + &also_seen(faint)
             }
             Self::WrongRecord { errors, corrected: None } => {
-                sentence(errors) + " Nothing can be said of effects until that is corrected."
+                sentence(errors, [simulator, rig])
+                    + " Nothing can be said of effects until that is corrected."
             }
             Self::WrongRecord { errors, corrected: Some(closes) } => {
-                sentence(errors)
+                sentence(errors, [simulator, rig])
                     + &format!(
                         " With that corrected, {} of the gap closes on trials that were not fitted, and {}.",
                         closed(closes),
@@ -261,12 +270,12 @@ impl Answer {
                     ),
                 };
                 format!(
-                    "There is a gap in {stage} that the catalogue does not explain: the re-tuned simulator leaves {left:.2} times the noise, and {with_best}.{parts}"
+                    "There is a gap in {stage} that the catalogue does not explain: the re-tuned {simulator} leaves {left:.2} times the noise, and {with_best}.{parts}"
                 )
             }
             Self::AtBounds { stage, parameters, left, .. } => format!(
                 "The parameters of {stage} do not fit within their tolerances: {} are at the end of them, and {left:.1} times the noise is left \
-                 all the same. Is it the right rig? If its parameters are right, something is missing that is not in the catalogue.",
+                 all the same. Is it the right {rig}? If its parameters are right, something is missing that is not in the catalogue.",
                 parameters.join(", ")
             ),
             Self::TooLittle { why } => why.words(),

@@ -22,6 +22,7 @@ pub(super) fn facts(
 ) -> RecordFacts {
     RecordFacts {
         is_lost: session.is_lost.clone(),
+        gauge_alone: true,
         rows_used: Some(RowsUsed { used: session.rows.used(), read: session.rows.read }),
         motion: Some(MotionSpec::new(session.reference.clone(), unit_of(reference))),
         signals: signals(reference, session, inputs),

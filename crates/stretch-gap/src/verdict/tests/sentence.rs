@@ -299,7 +299,7 @@ fn cases(simulator: &dyn Simulator) -> Vec<(&'static str, Case)> {
             "other units",
             wrong(vec![gross(
                 "factor",
-                "the simulator's y0 is 57.3 times the recording's: that is deg for rad",
+                "the simulated y0 is 57.3 times the recording's: that is deg for rad",
                 "convert the recording",
             )]),
         ),
@@ -350,6 +350,9 @@ fn every_answer_has_its_words() {
         let _ =
             writeln!(text, "# budget spent, {} left\n{}\n", rest.len(), cut.preface().trim_end());
     }
+    let agrees = Some(Answer::Agrees { small: Vec::new() });
+    let gauge = Diagnosis { answer: agrees, proposed: None, gauge_alone: true, ..plain.clone() };
+    let _ = writeln!(text, "# gauge alone\n{}\n", gauge.headline());
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/verdict/tests");
     is_in_file(&folder.join("sentences.txt"), &text);
     // The tests of reports read these values.

@@ -134,7 +134,7 @@ fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
     summarise(&seen, applied.faults);
     doubts.iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
     // The zero of another signal is no shift.
-    if seen.doubt().is_some() {
+    if seen.doubt().is_some_and(|doubt| doubt.explains_others()) {
         return;
     }
     let mut zero_watch = ZeroWatch::of(gauge, &trial.name);
@@ -195,7 +195,11 @@ fn live(
                 let reading = receptor.step(row.time_s, row.values[0]);
                 let warning = seen.take(row.time_s, row.values[0], &reading);
                 if let Some(zero) = receptor.zero() {
-                    zero_watch.take_unless(seen.doubt(), row.time_s, &zero);
+                    zero_watch.take_unless(
+                        seen.doubt().filter(Doubt::explains_others),
+                        row.time_s,
+                        &zero,
+                    );
                 }
                 if let Some(warning) = warning {
                     warn(format!("stretch: {warning}"));

@@ -458,7 +458,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         let models = choice.as_ref().map(|choice| blocks_of_models(choice, &options.reference));
         let (sentence, tested) = match &choice {
             None => (judged, None),
-            Some(choice) => (choice_in_words(choice, &ranking), (!test.is_empty()).then_some(judged)),
+            Some(choice) => {
+                (choice_in_words(choice, &ranking), (!test.is_empty()).then_some(judged))
+            }
         };
         say_first(sentence)?;
         let fits = blocks_of_calibration(&calibrated, &ranking, choice.is_some());

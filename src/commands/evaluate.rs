@@ -173,19 +173,17 @@ fn print(evaluation: &Evaluation, compared: Range<usize>) -> anyhow::Result<()> 
         let each = |trial: &TrialErrors| table_of_errors(&trial.trial, &trial.methods, unit);
         blocks.extend(trials.iter().map(each));
     }
-    let title = match &trials[..] {
-        [one] => one.trial.as_str(),
-        _ => "All trials",
+    let mut title = match &trials[..] {
+        [one] => one.trial.clone(),
+        _ => "All trials".to_owned(),
     };
     let mut shown = pooled.clone();
     if !is_verbose() && pooled.len() > MOST_SHOWN {
         shown[compared].sort_by(|a, b| a.rmse.total_cmp(&b.rmse));
         shown.truncate(MOST_SHOWN);
+        title = format!("{title} ({MOST_SHOWN} of {} rows)", pooled.len());
     }
-    blocks.push(table_of_errors(title, &shown, unit));
-    if shown.len() < pooled.len() {
-        blocks.push(format!("{} more with -v", pooled.len() - shown.len()));
-    }
+    blocks.push(table_of_errors(&title, &shown, unit));
     if is_verbose() {
         blocks.push(
             "Average error: mean |reference - estimate| over the range of the estimate, as in the paper. Bias: mean of estimate minus \

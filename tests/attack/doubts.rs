@@ -51,7 +51,8 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
     };
     // Stamps that are up to 4 ms early or late, in no order.
     let jitter = rows(&scratch, &|n, [t, length, signal]| {
-        let turn = (n as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 11;
+        let turn = (n as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let turn = (turn ^ (turn >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11;
         Some([t + 0.008 * (turn as f64 / 2_f64.powi(53) - 0.5), length, signal])
     });
     let own = fs::read_to_string(scratch.loops("own.csv", 20.0, 1.0)).unwrap();

@@ -220,11 +220,9 @@ pub fn rate_of(time_s: &[f64]) -> Option<f64> {
         _ => *steps.select_nth_unstable_by(middle, f64::total_cmp).1,
     };
     let short = steps.iter().filter(|step| **step < 1.5 * median);
-    let (count, sum) = short.fold((0_u32, 0.0), |(n, sum), step| (n + 1, sum + step));
+    let (count, sum) = short.clone().fold((0_u32, 0.0), |(n, sum), step| (n + 1, sum + step));
     let mean = sum / f64::from(count);
-    // A step that skips samples is a multiple of the mean.
-    let off = |step: &f64| step - mean * (step / mean).round().max(1.0);
-    let variance = steps.iter().map(|step| off(step).powi(2)).sum::<f64>() / steps.len() as f64;
+    let variance = short.map(|step| (step - mean).powi(2)).sum::<f64>() / f64::from(count);
     let over = JITTERED_OVER.min(time_s.len() / 2);
     let rate = if variance > (JITTER * median).powi(2) && over > 1 {
         let mut long: Vec<f64> = time_s.windows(over + 1).map(|w| w[over] - w[0]).collect();

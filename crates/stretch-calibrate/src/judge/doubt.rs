@@ -30,6 +30,11 @@ impl Doubt {
         Self { code, text }
     }
 
+    /// Whether this doubt explains every other one: the signal is in another unit, or the sensor is not connected.
+    pub fn explains_others(&self) -> bool {
+        matches!(self.code, "other_unit" | "constant_signal")
+    }
+
     /// Returns a doubt about a log if most of its samples were clamped to the calibrated range.
     pub fn of_clamped(clamped: u64, samples: u64) -> Option<Self> {
         not_its_own(clamped, samples).map(|text| Self::new("outside_range", text))
@@ -192,10 +197,8 @@ pub fn evaluation_doubts(
         let unit = spec.target.reference_per_normalised(spec.target_range).abs();
         let said = Doubt::of_errors(errors, unit * spec.model.fit_rmse(), &evaluation.unit);
         let outside = outside(&reach, errors.clamped, errors.samples);
-        // Another unit, or a sensor that is not connected, explains every other doubt.
-        let explains = |doubt: &Doubt| matches!(doubt.code, "other_unit" | "constant_signal");
         match outside {
-            Some(cause) if explains(&cause) => all.push(cause.of(name)),
+            Some(cause) if cause.explains_others() => all.push(cause.of(name)),
             // A shift comes first, because it also puts samples outside the range.
             outside => all.extend(said.chain(outside).map(|doubt| doubt.of(name))),
         }

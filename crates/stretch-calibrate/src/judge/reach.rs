@@ -227,7 +227,8 @@ mod tests {
         let near = doubt([max + 0.02 * span, max + 0.04 * span, middle]).expect("two are outside");
         assert!(near.contains("by 3 % of its width"), "{near}");
         assert!(!near.contains("the calibrated sensor"), "{near}");
-        let other = doubt([1e2 * middle; 3]).expect("all are outside");
+        let other = doubt([0.9, 0.5, 0.1].map(|share| 1e2 * (max - share * span)))
+            .expect("all are outside");
         assert!(other.contains("is the unit wrong? 3 lie inside when divided by 100"), "{other}");
     }
 

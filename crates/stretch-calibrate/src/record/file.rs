@@ -151,7 +151,7 @@ fn other_kind(text: &str) -> Option<&'static str> {
     if !first.starts_with('{') {
         let section = first.strip_prefix('[').and_then(|rest| rest.strip_suffix(']'));
         let is_section = section.is_some_and(|name| name.contains(|c: char| c.is_alphabetic()));
-        return match (is_section || first.contains(" = "), first.contains([',', ';', '\t'])) {
+        return match (is_section || first.contains(" = "), first.contains([',', ';', '\t', ' '])) {
             (true, _) => Some("a TOML file, such as a simulator or a problem,"),
             (false, true) => Some("a text file, such as a recording (CSV),"),
             (false, false) => None,

@@ -74,8 +74,7 @@ fn a_strong_effect_is_worth_it_and_the_same_set_is_not() {
     let is_accepted = |base, next| worth.is_accepted(base, next).expect("simulated");
     assert!(is_accepted(&problem.nominal, &play));
     assert!(!is_accepted(&play, &play) && !is_accepted(&play, &problem.nominal));
-    // A set that leaves an octave at twice the noise has room for a further effect, and one that
-    // leaves noise alone has not.
+    // The nominal simulator has room for an effect. A set that leaves noise alone has not.
     let cubic = index(&record, "cubic");
     assert!(worth.is_possible(&problem.nominal, cubic));
     let mut quiet = play.clone();

@@ -306,8 +306,8 @@ impl ZeroWatch {
         }
     }
 
-    /// Handles the state of the zero at the end of a movement, at `time_s`. If the signal is doubted, the doubt is reported
-    /// instead, once: the zero of another signal is no shift.
+    /// Passes the zero that was determined at the end of a movement, at `time_s`, to `take`. If the signal is doubted,
+    /// reports the doubt instead, once, because another signal does not show whether the zero has shifted.
     fn take_unless(&mut self, doubt: Option<Doubt>, time_s: f64, zero: &Zero<f64>) {
         let Some(doubt) = doubt else { return self.take(time_s, zero) };
         if !std::mem::replace(&mut self.has_doubt, true) {
@@ -315,7 +315,8 @@ impl ZeroWatch {
         }
     }
 
-    /// Handles the state of the zero at the end of a movement, at `time_s`.
+    /// Stores the zero that was determined at the end of a movement, at `time_s`. Warns if it has shifted and the zero
+    /// stored before had not.
     fn take(&mut self, time_s: f64, zero: &Zero<f64>) {
         if let Some(turns) = self.turns.filter(|_| zero.has_shifted && !self.shifted) {
             let basis = match turns.sessions {

@@ -43,7 +43,7 @@ pub(crate) fn init(args: InitArgs) -> anyhow::Result<()> {
     );
     write_text(&path, &first_problem(&args.folder)?)?;
     tell(format!(
-        "wrote {}: read its comments, write the simulator, then stretch diagnose it",
+        "wrote {}: read its comments, write the simulator, then run stretch diagnose on it",
         path.display()
     ))
 }

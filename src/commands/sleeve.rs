@@ -148,7 +148,7 @@ fn renew(args: RenewArgs) -> anyhow::Result<()> {
 
 fn print_renewal(renewed: &Renewed, unit: &str) -> anyhow::Result<()> {
     let summary = &renewed.summary;
-    say("There is no reference, so the movement is assumed to be that of earlier sessions, with")?;
+    say("Without a reference, ends and rests of the movement are assumed as in earlier sessions:")?;
     let header = ["", &format!("assumed {unit}"), "sd", "sessions", "before", "after"];
     let row = |a: &Assumed| {
         let [value, sd, before, after] = [a.reference, a.sd, a.before, a.after].map(number);

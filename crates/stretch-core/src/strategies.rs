@@ -165,7 +165,7 @@ pub fn observer_map(range: Range, sign: f64) -> impl Strategy<Value = ObserverMa
     )
 }
 
-/// Diagnosed maps with any subset of the defects and a curve from `observer_map`.
+/// Diagnosed maps with any subset of the defects. The curve and the noise are those of a map from `observer_map`.
 pub fn diagnosed_map(range: Range, sign: f64) -> impl Strategy<Value = DiagnosedMap> {
     let knee = || option::of((-0.1..0.3f64, 1e-3..0.05f64));
     let plays = |share| option::of((share, 0.001..0.2f64, 0.1..0.9f64));

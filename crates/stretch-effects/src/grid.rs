@@ -64,8 +64,8 @@ impl Grid {
         Self::new(dt_s, f64::INFINITY, 0.0)
     }
 
-    /// A grid of pieces no longer than `max_step_s`, split where commands that act `delay_s` later
-    /// switch.
+    /// A grid of pieces no longer than `max_step_s`. If commands act `delay_s` late, a piece also
+    /// ends at the time within the sample at which a late command takes effect.
     ///
     /// # Errors
     /// Fails if the sample time is not finite and positive, if `max_step_s` is NaN or below 1e-6 of

@@ -39,8 +39,8 @@ impl<T: Real> Curve<T> {
         (self.values[0], self.values[self.knots - 1])
     }
 
-    /// The drive at which the curve has the signal, and whether the signal lies on the curve. Beyond an end the last
-    /// segment is extended.
+    /// Returns the drive at which the curve takes the value `signal`, and whether the signal lies between the ends of
+    /// the curve. Beyond an end, the segment at that end is extended.
     #[inline(always)]
     pub(crate) fn inverse(&self, signal: T) -> (T, bool) {
         let (first, last) = self.ends();

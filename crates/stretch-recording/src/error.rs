@@ -44,7 +44,7 @@ pub enum RecordingError {
         lines: usize,
         /// The first line, shortened.
         first: String,
-        /// Whether a line below is a single number.
+        /// Whether any of these lines is a single number.
         is_one_column: bool,
     },
     /// Rows of numbers without names above them.

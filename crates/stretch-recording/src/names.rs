@@ -1,4 +1,4 @@
-//! Interprets the names of columns: units in brackets or in a separate row, and names that may be the time.
+//! Interprets the names of columns: reads units in brackets or in a separate row, and recognises names of the time.
 
 use stretch_data::spelt_unit;
 

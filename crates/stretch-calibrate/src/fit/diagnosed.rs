@@ -72,7 +72,7 @@ pub(crate) fn diagnosed(
     let (forward, map) = best.ok_or(CalibrateError::NoTrials)?;
     let report = report(&forward, &map);
     let note = format!(
-        "diagnosed: {}; noise of the signal {:.4}; the speed of the motion is modelled as a random walk of {} 1/s^3 with a correlation time of {} s",
+        "diagnosed: {}; noise of the signal {:.4}; the speed of the motion is modelled as a random walk with a spectral density of {} 1/s^3 and a correlation time of {} s",
         prepared.options.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(", "),
         map.noise,
         map.agility,

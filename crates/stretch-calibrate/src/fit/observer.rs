@@ -63,7 +63,7 @@ pub(crate) fn observer(
     let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
     let report = FitReport::of_model(kind, &map.fit, sse, condition, coefficients, terms, None);
     let note = format!(
-        "observer: {terms} parameters; noise of the signal {:.4}; the speed of the motion is modelled as a random walk of {} 1/s^3{}",
+        "observer: {terms} parameters; noise of the signal {:.4}; the speed of the motion is modelled as a random walk with a spectral density of {} 1/s^3{}",
         forward.noise,
         choice.agility,
         choice.rest.map_or(String::new(), |r| format!(", baseline leaking {:.4} a second", r.leak)),

@@ -194,7 +194,7 @@ impl PreparedProblem<'_> {
     }
 }
 
-/// The result for one stage with deviations.
+/// The result of fitting deviations of form to the residual of one stage.
 struct Deviating {
     misfit: Misfit,
     /// Cost of the deviations, nats.

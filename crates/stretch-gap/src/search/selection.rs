@@ -38,8 +38,8 @@ const FAINT: f64 = 0.03;
 /// Largest number of times that an effect of the best set is replaced.
 const EXCHANGES: usize = 2;
 
-/// Number of cached screens. The screen that selected an effect is then still cached when
-/// alternatives to that effect are searched.
+/// Number of cached screens. It is large enough that the screen that selected an effect is still
+/// cached when alternatives to that effect are searched.
 const LOOKED: usize = 4;
 
 /// The search over sets of effects.

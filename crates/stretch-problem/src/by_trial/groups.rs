@@ -18,7 +18,7 @@ const HELD: f64 = 0.9;
 /// Smallest distance between the medians of two set-ups, as a share of the range of all medians.
 /// The distance must also exceed the spread within every trial.
 const APART: f64 = 0.1;
-/// Number of runs into which a column that moves within trials divides the samples.
+/// Number of groups into which the samples are divided at the quartiles of a column that changes within trials.
 const PARTS: usize = 4;
 /// Smallest number of samples of a group; smaller groups are dropped.
 const FEWEST: usize = 20;

@@ -40,8 +40,8 @@ const ALIKE: f64 = 0.3;
 /// Roles of the samples: fitted, held out, test.
 const ROLES: [Role; 3] = [Role::Fit, Role::Held, Role::Test];
 
-/// One stage, projected on the changes of the output by some probes. Let u_i be the change by probe
-/// i, V the metric of the stage and n the noise.
+/// Products of the changes that the probes cause in the output of one stage, and of the noise. Let
+/// u_i be the change that probe i causes, V the metric of the stage and n the noise.
 struct Place {
     stage: usize,
     /// Products u_i'V^-1 u_j by role of the samples.
@@ -49,8 +49,9 @@ struct Place {
     /// Normal matrix of a fit of the probes' amplitudes: products over the fitted samples, plus the
     /// prior of the nominal parameters.
     weighed: DMatrix<f64>,
-    /// Variance of the noise relative to its estimate, and its autocorrelation sums.
+    /// Variance of the noise, relative to the estimated variance.
     noise: f64,
+    /// Autocorrelation sums of the noise.
     noise_lags: Lags,
     /// By draw and role: the products u_i'V^-1 n, and |n|^2/N - 1 for N samples.
     draws: Vec<[Vec<f64>; 3]>,

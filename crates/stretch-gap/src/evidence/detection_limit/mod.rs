@@ -75,9 +75,9 @@ pub struct DetectionLimit {
     /// Parameter that is its strength.
     pub parameter: String,
     /// Value of the parameter at which the effect would be named with probability 0.9 if the
-    /// re-tuned nominal simulator were otherwise true. The effect's other parameters have the
-    /// values of the start from which it is detected most easily. `None` if no value within its
-    /// range would be named.
+    /// re-tuned nominal simulator were otherwise true. A fit of an effect begins at several sets of
+    /// values, its starts. The effect's other parameters have the values of the start at which the
+    /// effect is easiest to detect. `None` if no value within its range would be named.
     pub strength: Option<f64>,
     /// Unit of the value.
     pub unit: String,

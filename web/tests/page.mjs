@@ -163,7 +163,7 @@ const refused = async () => {
   await press(page, "calibrate");
   check((await page.innerText("#fitted")).includes("not fitted"), `a recording is held out: ${await page.innerText("#fitted")}`);
   check((await page.innerText("#judged-on")).startsWith("Judged on held"), `and judged on: ${await page.innerText("#judged-on")}`);
-  await page.selectOption("#model", "poly13");
+  await page.selectOption("#model", "curve");
   check(await page.locator("#calibrated.stale").count() === 1, "results of other choices are greyed");
   await press(page, "calibrate");
   check(await page.locator("#calibrated.stale").count() === 0, "until they are computed again");
@@ -188,8 +188,8 @@ const refused = async () => {
   await page.context().close();
 };
 
-/** What the program said on standard error, whose lines break at a terminal's width. */
-const toldBy = (name) => text(join(wanted, name)).replace(/^stretch: /gm, "\u0000").replace(/\s+/g, " ").split("\u0000").map((one) => one.trim()).filter(Boolean);
+/** The doubts that the program printed on standard error, without the summary; its lines break at the width of a terminal. */
+const toldBy = (name) => text(join(wanted, name)).replace(/^[\d,]+ samples: .*?(?=^stretch: |$(?![^]))/gms, "").replace(/^stretch: /gm, "\u0000").replace(/\s+/g, " ").split("\u0000").map((one) => one.trim()).filter(Boolean);
 
 /** What makes one doubt an evaluation is said in the program's words. */
 const doubted = async () => {

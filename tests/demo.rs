@@ -6,15 +6,15 @@ use crate::support::{Scratch, fails, runs, stretch};
 use serde_json::Value;
 use testkit::page::without_program;
 
-/// Asserts that the report contains calibration and diagnosis, and needs no network.
-fn holds_both_parts(out: &Path) {
+/// Asserts that the report contains calibration and diagnosis of `compared`, and needs no network.
+fn holds_both_parts(out: &Path, compared: &str) {
     let page = without_program(&fs::read_to_string(out.join("report.html")).unwrap());
     for heading in
         ["How good it is", "The surfaces (non-linear)", "Where the gap sits", "Which effect"]
     {
         assert_eq!(page.matches(&format!("<h2>{heading}")).count(), 1, "{heading}");
     }
-    assert!(page.contains(": simulator against rig</h1>") && !page.contains("NaN"));
+    assert!(page.contains(&format!(": {compared}</h")) && !page.contains("NaN"));
     assert_eq!(page.matches("<!DOCTYPE html>").count(), 1);
     // Each part begins with a picture.
     let parts: Vec<&str> = page.split("<p class=\"verdict\">").skip(1).collect();
@@ -52,7 +52,7 @@ fn the_demo_does_the_whole_job_without_anybody_s_data() {
     named.sort_unstable();
     assert_eq!(named, ["gauge_nonlinearity", "gauge_relaxation", "muscle_hysteresis"]);
     assert_eq!(said["diagnosis"]["verdict"], "effect");
-    holds_both_parts(&out);
+    holds_both_parts(&out, "simulator against rig");
     for name in ["linear.json", "poly13.json", "chosen.json", "estimates.csv", "estimate.svg"] {
         assert!(out.join(name).metadata().unwrap().len() > 100, "{name}");
     }
@@ -90,7 +90,7 @@ fn with_data_measured_sessions_take_the_same_way() {
     let verdict = said["diagnosis"]["verdict"].as_str().unwrap();
     assert!(["partial", "unknown"].contains(&verdict), "{verdict}");
     assert!(said["diagnosis"]["unexplained"]["share"].as_f64().unwrap() > 0.05, "{text}");
-    holds_both_parts(&out);
+    holds_both_parts(&out, "calibration line against gauge");
     let command = &mut stretch();
     command.args(["demo", "--data"]).arg(sleeve.join("heel"));
     command.arg("--out").arg(scratch.path("other"));

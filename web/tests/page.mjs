@@ -163,8 +163,9 @@ const refused = async () => {
   await press(page, "calibrate");
   check((await page.innerText("#fitted")).includes("not fitted"), `a recording is held out: ${await page.innerText("#fitted")}`);
   check((await page.innerText("#judged-on")).startsWith("Judged on held"), `and judged on: ${await page.innerText("#judged-on")}`);
-  await page.selectOption("#model", "curve");
+  await page.selectOption("#model", "poly13");
   check(await page.locator("#calibrated.stale").count() === 1, "results of other choices are greyed");
+  await page.selectOption("#model", "linear");
   await press(page, "calibrate");
   check(await page.locator("#calibrated.stale").count() === 0, "until they are computed again");
   await put(page, [file("text.csv", `time_s,pos_mm,out_v\n${rows.slice(0, 9).join("\n")}\n9,n/a,1.5\n`)]);

@@ -208,7 +208,10 @@ fn with_python_what_a_worker_does_wrong_is_told_with_its_last_lines() {
     let cases = [
         ("begin(); receive(); raise ValueError('no such gear')", "no such gear"),
         ("begin(); receive(); os.abort()", "it ended with"),
-        ("begin(); receive(); time.sleep(60)", "did not answer within 0.5 s; if it needs longer, raise deadline_s"),
+        (
+            "begin(); receive(); time.sleep(60)",
+            "did not answer within 0.5 s; if it needs longer, raise deadline_s",
+        ),
         ("begin(); receive(); print('step 1 of 10 is done')", "only frames may be written there"),
         (
             "begin(); receive(); send({'kind': 'outputs', 'models': []})",

@@ -267,7 +267,7 @@ fn a_prior_needs_seconds_of_reference_or_none() {
     scratch.worn("today.csv", new, |row| row[2] = f64::NAN);
     let renew = ["sleeve", "renew", "--prior", "prior.json", "--out"];
     let said = runs(scratch.sleeve(&renew).args(["renewed.json", "today.csv"]));
-    assert!(said.contains("is assumed to be") && said.contains("high end"), "{said}");
+    assert!(said.contains("are assumed to be") && said.contains("high end"), "{said}");
     let renewed = scratch.error("renewed.json", "new.csv").0;
     assert!(renewed < 0.6 * alone && renewed > ten, "{renewed} beside {alone}");
     // The calibration of an earlier session of the same wearer, made from the same prior.

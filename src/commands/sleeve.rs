@@ -148,7 +148,9 @@ fn renew(args: RenewArgs) -> anyhow::Result<()> {
 
 fn print_renewal(renewed: &Renewed, unit: &str) -> anyhow::Result<()> {
     let summary = &renewed.summary;
-    say("Without a reference, ends and rests of the movement are assumed as in earlier sessions:")?;
+    say(
+        "Without a reference, the ends and the rest of the movement are assumed to be those of earlier sessions:",
+    )?;
     let header = ["", &format!("assumed {unit}"), "sd", "sessions", "before", "after"];
     let row = |a: &Assumed| {
         let [value, sd, before, after] = [a.reference, a.sd, a.before, a.after].map(number);

@@ -526,6 +526,11 @@ fn choose(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateE
     choice
 }
 
+/// Calibrates with a straight line on the same trials and columns.
+fn straight_line(trials: &[Trial], options: &Options) -> Result<Calibrated, CalibrateError> {
+    calibrate(trials, &Options { model: ModelKind::Linear, ..options.clone() })
+}
+
 /// Ratio of the error of a model to that of a straight line from which a note is given.
 const WORSE: f64 = 1.05;
 
@@ -535,8 +540,8 @@ fn worse_than_a_line(
     trials: &[Trial],
     options: &Options,
 ) -> Option<String> {
-    let line = Options { model: ModelKind::Linear, ..options.clone() };
-    let line = (options.model != ModelKind::Linear).then(|| calibrate(trials, &line).ok())??;
+    let line =
+        (options.model != ModelKind::Linear).then(|| straight_line(trials, options).ok())??;
     let both = [("chosen", &calibrated.calibration), ("linear", &line.calibration)];
     let evaluation = evaluate_errors(&both, trials).ok()?;
     let [_, own, line] = &evaluation.pooled[..] else { return None };
@@ -567,8 +572,7 @@ fn judge(
         return Ok(verdict(calibrated, trials, evaluation, options));
     };
     // The line is the baseline with which every surface is compared.
-    let linear = Options { model: ModelKind::Linear, ..options.clone() };
-    let linear = calibrate(trials, &linear).map_err(|error| of_files(error, &args.trials))?;
+    let linear = straight_line(trials, options).map_err(|error| of_files(error, &args.trials))?;
     let (page, evaluation) = report(trials, test, [&linear, calibrated], chosen, options)?;
     stage_text(outputs, path, &page)?;
     Ok(verdict(calibrated, trials, Ok(evaluation), options))

@@ -483,10 +483,6 @@ fn report(
         reservations.push(Note::default().text(because).effects(&not_examined, ", "));
     }
     notes.extend(reservations.iter().cloned());
-    let is_open = matches!(judged.kind, VerdictKind::Partial | VerdictKind::Unknown);
-    let is_searched = is_open && task.depth() > 0 && too_little.is_none();
-    let mut not_fitted = if is_searched { searched.not_looked_at() } else { Vec::new() };
-    not_fitted.retain(|name| !not_examined.contains(name));
     notes.extend(searched.problem.starts.note().map(Note::from));
     notes.extend(recorder_notes(cause.problem).into_iter().map(Note::from));
     if evidence.gap.retuned > thresholds.least_gap {
@@ -502,9 +498,10 @@ fn report(
     let model_runs = runs.counted();
     let spent = model_runs.and_then(|runs| runs.note());
     let cut_short = spent.is_some().then(|| searched.not_looked_at());
-    if spent.is_some() {
-        not_fitted.clear();
-    }
+    let is_open = matches!(judged.kind, VerdictKind::Partial | VerdictKind::Unknown);
+    let is_searched = is_open && task.depth() > 0 && too_little.is_none() && spent.is_none();
+    let mut not_fitted = if is_searched { searched.not_looked_at() } else { Vec::new() };
+    not_fitted.retain(|name| !not_examined.contains(name));
     notes.extend(not_fitted_note(&not_fitted));
     notes.extend(friction_note(simulator, &naming.named));
     notes.extend(spent.map(Note::from));

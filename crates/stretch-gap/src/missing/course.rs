@@ -254,19 +254,24 @@ mod tests {
         }
     }
 
+    /// Returns a course that switches between two levels, at each sample with the probability
+    /// `share`.
+    fn switching(share: f64, seed: u64) -> Vec<f64> {
+        let mut random = RandomGenerator::new(seed, 1);
+        let mut level = 0.0;
+        let mut next = || {
+            if random.unit() < share {
+                level = 12.0 - level;
+            }
+            level
+        };
+        (0..12_000).map(|_| next()).collect()
+    }
+
     /// Jumps that occur twice a second on average are counted and measured.
     #[test]
     fn jumps_are_counted_and_measured() {
-        let mut random = RandomGenerator::new(3, 1);
-        let mut level = 0.0;
-        let course: Vec<f64> = (0..12_000)
-            .map(|_| {
-                if random.unit() < 0.02 {
-                    level = if level == 0.0 { 12.0 } else { 0.0 };
-                }
-                level
-            })
-            .collect();
+        let course = switching(0.02, 3);
         let found = of(&beside_noise(|i| course[i], 2));
         let Some(Course::Jumps { per_s, size }) = found else { panic!("{found:?}") };
         // 240 jumps are expected, with a standard deviation of sqrt(240) = 15.
@@ -312,16 +317,7 @@ mod tests {
     /// Jumps at random times are reported although the simulator moves in steps.
     #[test]
     fn jumps_apart_from_the_motion_are_reported() {
-        let mut random = RandomGenerator::new(7, 1);
-        let mut level = 0.0;
-        let course: Vec<f64> = (0..12_000)
-            .map(|_| {
-                if random.unit() < 0.01 {
-                    level = if level == 0.0 { 12.0 } else { 0.0 };
-                }
-                level
-            })
-            .collect();
+        let course = switching(0.01, 7);
         let values = beside_noise(|i| course[i], 8);
         let stretches: Vec<&[f64]> = values.chunks(6000).collect();
         let steps = |i: usize| if (i / 130).is_multiple_of(2) { 40.0 } else { -40.0 };

@@ -29,16 +29,17 @@ pub(crate) struct Acceptance<'a> {
 impl Acceptance<'_> {
     /// Whether `next`, which has one effect more than `base`, meets every criterion. The criteria
     /// are checked twice, without and with deviations of the effects' forms, because what a
-    /// deviation explains is not evidence for a further effect.
+    /// deviation explains is not evidence for a further effect. `deviating` is `base` with
+    /// deviations.
     pub(crate) fn is_accepted(
         &self,
-        base: &Hypothesis,
+        (base, deviating): (&Hypothesis, &Hypothesis),
         next: &Hypothesis,
     ) -> Result<bool, GapError> {
         if !self.meets(base, next) {
             return Ok(false);
         }
-        Ok(base.effects.is_empty() || self.meets(&self.deviating(base)?, &self.deviating(next)?))
+        Ok(base.effects.is_empty() || self.meets(deviating, &self.deviating(next)?))
     }
 
     /// Returns a set with deviations from the usual forms of its effects.

@@ -164,12 +164,13 @@ impl<'a> Search<'a> {
             return Ok(None);
         }
         let looked = self.look(best)?;
+        let deviating = self.acceptance.deviating(best)?;
         let mut found: Option<Hypothesis> = None;
         for (replaced, rival) in rivals.iter().filter(|(_, r)| r.score > RIVALRY * best.score) {
             let joined = self.sets.joined(best, &looked.ground, (*replaced, rival))?;
             let Some(joined) = joined else { continue };
             let is_better = found.as_ref().is_none_or(|f| joined.score > f.score);
-            if is_better && self.acceptance.is_accepted(best, &joined)? {
+            if is_better && self.acceptance.is_accepted((best, &deviating), &joined)? {
                 found = Some(joined);
             }
         }
@@ -253,9 +254,10 @@ impl<'a> Search<'a> {
             let Looked { ground, screened } = &*looked;
             let kept = if round == 0 { KEPT } else { KEPT_LATER };
             let deviating = self.acceptance.deviating(&best)?;
-            let list = self.shortlist((&best, &deviating), screened, kept);
+            let base = (&best, &deviating);
+            let list = self.shortlist(base, screened, kept);
             progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
-            let mut next = self.first_accepted(&best, ground, &list)?;
+            let mut next = self.first_accepted(base, ground, &list)?;
             let is_open = self.problem.gap(&best) > self.acceptance.thresholds.null_excess;
             if next.is_none() && is_open && self.is_thorough && !self.problem.is_spent() {
                 // A screen assumes linear changes. Before a gap is left unexplained, every effect
@@ -264,7 +266,7 @@ impl<'a> Search<'a> {
                 let others = self.others(&deviating, screened, &list);
                 let least = |effect| self.least_gain(&best, effect);
                 let others = self.sets.promising(&best, ground, others, least)?;
-                next = self.first_accepted(&best, ground, &others)?;
+                next = self.first_accepted(base, ground, &others)?;
             }
             let Some(next) = next else { break };
             best = next;
@@ -277,15 +279,16 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the extension of `base` with the highest score that meets the acceptance criteria.
+    /// `base` is a set, without and with deviations.
     /// The extension with the highest score of all may fail them, if it only explains the model
     /// discrepancy of other effects.
     fn first_accepted(
         &mut self,
-        base: &Hypothesis,
+        base: (&Hypothesis, &Hypothesis),
         ground: &Ground,
         list: &[Screened],
     ) -> Result<Option<Hypothesis>, GapError> {
-        let found = self.sets.extend_all(base, ground, list, base.score)?;
+        let found = self.sets.extend_all(base.0, ground, list, base.0.score)?;
         for next in found {
             if self.acceptance.is_accepted(base, &next)? {
                 return Ok(Some(next));
@@ -321,7 +324,8 @@ impl<'a> Search<'a> {
                 }
             }
             let Some(less) = weakest else { break };
-            if self.acceptance.is_accepted(&less, &best)? {
+            let deviating = self.acceptance.deviating(&less)?;
+            if self.acceptance.is_accepted((&less, &deviating), &best)? {
                 break;
             }
             best = less;
@@ -383,7 +387,7 @@ impl<'a> Search<'a> {
     }
 
     /// Returns sets in which one effect of `best` is replaced by another, each with the replaced
-    /// effect. Only replacements that the screen finds promising, and twins of the replaced effect,
+    /// effect. Only replacements with a large gain in the screen, and twins of the replaced effect,
     /// are fitted.
     fn rivals(&mut self, best: &Hypothesis) -> Result<Vec<(usize, Hypothesis)>, GapError> {
         let mut out = Vec::new();

@@ -80,13 +80,19 @@ impl GaugeSimulator {
         Ok(vec![signal])
     }
 
-    /// A course without pressure, in which the reference moves no faster than it was recorded; `is_known` states whether
-    /// blocks of known length replace the reference.
-    fn held(&self, points: &[(f64, f64)], is_known: bool) -> Course {
-        let (session, dt_s) = (&self.session, self.session.dt_s);
-        let rates = of_position(&session.reference, &TrialSpec::ranges(&session.trials), dt_s);
+    /// Greatest rate of the recorded reference, outside the test trials.
+    fn fastest(&self) -> f64 {
+        let session = &self.session;
+        let ranges = TrialSpec::ranges(&session.trials);
+        let rates = of_position(&session.reference, &ranges, session.dt_s);
         let rates = session.fitted().flat_map(|range| &rates[range]);
-        let fastest = rates.fold(0.0, |a: f64, rate| a.max(rate.abs()));
+        rates.fold(0.0, |a: f64, rate| a.max(rate.abs()))
+    }
+
+    /// A course without pressure, in which the reference moves no faster than `fastest`; `is_known` states whether
+    /// blocks of known length replace the reference.
+    fn held(&self, points: &[(f64, f64)], is_known: bool, fastest: f64) -> Course {
+        let dt_s = self.session.dt_s;
         let points = paced(points, self.nominal.spec.span.abs() / fastest);
         let most = self.inputs[0].values.len().max((LONGEST_S / dt_s) as usize);
         let e: Vec<f64> = course(&points, dt_s).take(most).collect();
@@ -129,11 +135,11 @@ impl Laboratory for GaugeSimulator {
     type Setting = Course;
 
     fn experiments(&self) -> Vec<(Plan, Course)> {
-        let dt_s = self.session.dt_s;
+        let (dt_s, fastest) = (self.session.dt_s, self.fastest());
         let moving =
             moving().into_iter().map(|(name, how, points)| (name, how, 0.25, points, false));
         let all = moving.chain(still()).map(|(name, how, prepare_min, points, is_known)| {
-            self.experiment((name, how), prepare_min, self.held(&points, is_known))
+            self.experiment((name, how), prepare_min, self.held(&points, is_known, fastest))
         });
         let mut candidates: Vec<(Plan, Course)> = all.collect();
         if !self.session.pressure.is_empty() {

@@ -71,7 +71,10 @@ fn a_strong_effect_is_worth_it_and_the_same_set_is_not() {
     let worth = worth(&problem, &thresholds);
     let play = with_effects(&problem, &[(index(&record, "play"), vec![0.1])]);
     let play = Sets::new(&problem).refit(&play).expect("fitted");
-    let is_accepted = |base, next| worth.is_accepted(base, next).expect("simulated");
+    let is_accepted = |base, next| {
+        let deviating = worth.deviating(base).expect("simulated");
+        worth.is_accepted((base, &deviating), next).expect("simulated")
+    };
     assert!(is_accepted(&problem.nominal, &play));
     assert!(!is_accepted(&play, &play) && !is_accepted(&play, &problem.nominal));
     // The nominal simulator has room for an effect. A set that leaves noise alone has not.

@@ -116,7 +116,11 @@ impl<'a> Runs<'a> {
     }
 
     /// Notes that these effects could not be screened or fitted because some of their runs failed.
+    /// If the budget is used up, it may be the only reason, and nothing is noted.
     pub(crate) fn not_fitted(&self, effects: &[usize]) {
+        if self.is_spent() {
+            return;
+        }
         self.lost().not_fitted.extend(self.names(effects.iter().copied()));
     }
 

@@ -384,7 +384,7 @@ impl<'a> Sets<'a> {
         let again: Vec<(usize, &Model)> =
             screened.iter().filter_map(|s| Some((s.effect, before(s)?))).collect();
         let again_of: Vec<usize> = again.iter().map(|(effect, _)| *effect).collect();
-        let again = possible(again.into_par_iter().map(|(effect, model)| {
+        let again = possible(self.affordable(again).map(|(effect, model)| {
             Ok((effect, self.extend(base, ground, effect, (model.clone(), GLANCE))?))
         }))?;
         let fresh: Vec<&Screened> =
@@ -396,7 +396,7 @@ impl<'a> Sets<'a> {
         let begun: Vec<(usize, Model)> =
             begun.chain(best.into_iter().map(|(effect, fitted)| (effect, fitted.model))).collect();
         let asked: Vec<usize> = begun.iter().map(|(effect, _)| *effect).chain(again_of).collect();
-        let fits = begun.into_par_iter().map(|(effect, model)| {
+        let fits = self.affordable(begun).map(|(effect, model)| {
             Ok((effect, self.extend(base, ground, effect, (model, COARSE))?))
         });
         let fitted: BTreeMap<usize, Extended> = possible(fits)?.into_iter().chain(again).collect();
@@ -430,7 +430,7 @@ impl<'a> Sets<'a> {
         let each = |(e, models): (usize, Vec<Model>)| models.into_iter().map(move |m| (e, m));
         let glances: Vec<(usize, Model)> = starts.into_iter().flat_map(each).collect();
         let asked: Vec<usize> = glances.iter().map(|(effect, _)| *effect).collect();
-        let looked = glances.into_par_iter().map(|(effect, model)| {
+        let looked = self.affordable(glances).map(|(effect, model)| {
             let (stages, model) = self.part(base, effect, model);
             let fitted = self.problem.compare.fit(&stages, model, &ground.known, GLANCE)?;
             Ok((effect, fitted))
@@ -443,6 +443,12 @@ impl<'a> Sets<'a> {
         }
         self.take_out(&asked, |effect| best.contains_key(&effect));
         Ok(best)
+    }
+
+    /// Returns the candidates as long as the budget of runs permits further fits. What is left of
+    /// the budget belongs to the answer.
+    fn affordable<T: Send>(&self, candidates: Vec<T>) -> impl ParallelIterator<Item = T> {
+        candidates.into_par_iter().filter(|_| !self.problem.is_spent())
     }
 
     /// Notes which of the requested effects could not be fitted.
@@ -492,9 +498,8 @@ impl<'a> Sets<'a> {
         let close = coarse.iter().filter(|(e, extended)| is_open(e, extended));
         let close: Vec<(usize, &Hypothesis)> = close.map(|(e, s)| (*e, &s.set)).collect();
         possible(
-            close
-                .par_iter()
-                .map(|&(effect, set)| Ok((effect, unless_lost(self.polish(base, set, effect))?))),
+            self.affordable(close)
+                .map(|(effect, set)| Ok((effect, unless_lost(self.polish(base, set, effect))?))),
         )
     }
 

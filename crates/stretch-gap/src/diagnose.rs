@@ -136,7 +136,7 @@ fn answered<'a>(
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let searched = search(task, problem, from)?;
     let suspect = Suspect::of(searched.problem.simulator());
-    let doubted = searched.problem.beside(&suspect);
+    let doubted = searched.problem.beside(&suspect).with_reserve(false);
     let error = match columns.is_empty() {
         true => doubt(task, &searched, (&doubted, &suspect))?,
         false => None,
@@ -245,15 +245,18 @@ fn search<'a>(
     from: &Hypothesis,
 ) -> Result<Searched<'a>, GapError> {
     let Task { options, progress, .. } = task;
+    let problem = problem.with_reserve(false);
     let mut search = Search::new(&problem, &options.thresholds, task.depth()).quick();
     let best = search.best(from, progress)?;
     let least_gap = options.thresholds.least_gap;
-    if let Some(other) = problem.retuned_from(&best, least_gap, options.seed)? {
+    let other = if_possible(problem.retuned_from(&best, least_gap, options.seed))?.flatten();
+    if let Some(other) = other {
         let from = other.nominal.clone();
         return self::search(task, other, &from);
     }
     progress("nuisances");
-    let other = re_estimated(&problem, &mut search.sets, &best, options.seed)?;
+    let other = re_estimated(&problem, &mut search.sets, &best, options.seed);
+    let other = if_possible(other)?.flatten();
     let rivalled = |mut search: Search<'_>, best: Hypothesis| {
         let alone = Found { best: best.clone(), rivals: Vec::new() };
         let cause = Cause { problem: search.problem, found: &alone, eliminated: &[], gross: &[] };
@@ -264,19 +267,24 @@ fn search<'a>(
         let looked = search.looked_at_nominal();
         Ok::<_, GapError>((found, eliminated, search.sets.tried, looked))
     };
-    let (problem, (found, eliminated, tried, looked)) = match other {
+    let again = match other {
         Some((other, from)) => {
             let mut search = search.again(&other);
-            let best = search.best(&from, progress)?;
-            let rest = rivalled(search, best)?;
-            (other, rest)
+            match if_possible(search.best(&from, progress))? {
+                Some(best) => Some((rivalled(search, best)?, other)),
+                None => None,
+            }
         }
+        None => None,
+    };
+    let ((found, eliminated, tried, looked), problem) = match again {
+        Some(again) => again,
         None => {
             let best = search.thoroughly(best, progress)?;
-            let rest = rivalled(search, best)?;
-            (problem, rest)
+            (rivalled(search, best)?, problem)
         }
     };
+    let problem = problem.with_reserve(true);
     Ok(Searched { problem, found, eliminated, tried, looked, is_lost: false })
 }
 
@@ -346,7 +354,8 @@ struct Gathered {
 
 /// Gathers the evidence. Test trials are read here for the first time.
 fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, GapError> {
-    let Cause { problem, found, eliminated, .. } = cause;
+    let Cause { found, eliminated, .. } = cause;
+    let problem = &cause.problem.clone().with_reserve(true);
     let (seed, thresholds) = (task.options.seed, &task.options.thresholds);
     (task.progress)("test trials");
     let mut evidence = Evidence::gather(problem, found)?;

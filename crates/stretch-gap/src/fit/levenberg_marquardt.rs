@@ -161,7 +161,7 @@ impl Comparison<'_> {
         effort: Effort,
     ) -> Result<Fitted, GapError> {
         for &stage in stages {
-            self.simulator().linearise(stage, &start, self.roles.fit_trials)?;
+            self.runs.linearise(stage, &start, self.roles.fit_trials)?;
         }
         self.fit(stages, start, &[], effort)
     }

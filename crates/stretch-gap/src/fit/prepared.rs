@@ -173,6 +173,13 @@ impl<'a> PreparedProblem<'a> {
         })
     }
 
+    /// The same problem, whose runs may or may not use the last runs of a budget. These are
+    /// reserved for the answer.
+    pub(crate) fn with_reserve(mut self, may_use_reserve: bool) -> Self {
+        self.compare.runs.use_reserve(may_use_reserve);
+        self
+    }
+
     /// The same problem with another simulator of the same stages and parameters.
     pub(crate) fn beside<'b>(&self, simulator: &'b dyn Simulator) -> PreparedProblem<'b>
     where
@@ -402,8 +409,7 @@ impl<'a> PreparedProblem<'a> {
 /// Lets the simulator linearise all stages around a model, if runs are costly.
 pub(super) fn linearise(compare: &Comparison<'_>, model: &Model) -> Result<(), GapError> {
     let mut stages = 0..compare.metrics.len();
-    stages
-        .try_for_each(|stage| compare.simulator().linearise(stage, model, compare.roles.fit_trials))
+    stages.try_for_each(|stage| compare.runs.linearise(stage, model, compare.roles.fit_trials))
 }
 
 /// Returns every stage [re-tuned](retuned). If the result cannot be simulated over all trials, the

@@ -55,8 +55,8 @@ impl Simulator for Altered<'_> {
         self.simulator.is_costly(effect)
     }
 
-    fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
-        self.simulator.linearise(stage, model, trials)
+    fn linearise(&self, run: Run<'_>) -> Result<(), GapError> {
+        self.simulator.linearise(run)
     }
 
     fn input(&self, stage: usize) -> Option<Vec<f64>> {

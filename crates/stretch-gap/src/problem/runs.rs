@@ -49,6 +49,8 @@ pub(crate) struct Runs<'a> {
     most: Arc<[f64]>,
     /// Factor on the integration steps.
     step: f64,
+    /// As the field of [`Run`].
+    may_use_reserve: bool,
 }
 
 impl<'a> Runs<'a> {
@@ -73,7 +75,7 @@ impl<'a> Runs<'a> {
             Ok(if greatest > 0.0 { MOST.min(MOST * greatest) } else { MOST })
         };
         let most = simulator.stages().iter().enumerate().map(most).collect::<Result<_, _>>()?;
-        Ok(Self { simulator, stop, count, was_cut, lost, most, step: 1.0 })
+        Ok(Self { simulator, stop, count, was_cut, lost, most, step: 1.0, may_use_reserve: true })
     }
 
     /// Prepares runs of another simulator of the same session. They are added to the same count.
@@ -83,12 +85,18 @@ impl<'a> Runs<'a> {
     {
         let (count, was_cut) = (Arc::clone(&self.count), Arc::clone(&self.was_cut));
         let (lost, most) = (Arc::clone(&self.lost), Arc::clone(&self.most));
-        Runs { simulator, stop: self.stop, count, was_cut, lost, most, step: self.step }
+        let Self { stop, step, may_use_reserve, .. } = *self;
+        Runs { simulator, stop, count, was_cut, lost, most, step, may_use_reserve }
     }
 
     /// Returns runs whose integration steps are `step` times as long.
     pub(crate) fn at_step(&self, step: f64) -> Self {
         Self { step, ..self.clone() }
+    }
+
+    /// Sets whether the runs may use the last runs of a budget.
+    pub(crate) fn use_reserve(&mut self, may_use_reserve: bool) {
+        self.may_use_reserve = may_use_reserve;
     }
 
     pub(crate) fn simulator(&self) -> &'a dyn Simulator {
@@ -195,6 +203,16 @@ impl<'a> Runs<'a> {
         self.run(Run::exact(stage, model, trials))
     }
 
+    /// Linearises a stage around a model for the first `trials` trials.
+    pub(crate) fn linearise(
+        &self,
+        stage: usize,
+        model: &Model,
+        trials: usize,
+    ) -> Result<(), GapError> {
+        self.simulator.linearise(self.stepped(Run::exact(stage, model, trials)))
+    }
+
     /// Runs one stage on its measured input.
     pub(crate) fn run(&self, run: Run<'_>) -> Result<Vec<f64>, GapError> {
         let mut out = self.begin(run)?;
@@ -272,7 +290,7 @@ impl<'a> Runs<'a> {
     }
 
     fn stepped<'m>(&self, run: Run<'m>) -> Run<'m> {
-        Run { step: self.step * run.step, ..run }
+        Run { step: self.step * run.step, may_use_reserve: self.may_use_reserve, ..run }
     }
 
     fn begin(&self, run: Run<'_>) -> Result<Vec<f64>, GapError> {

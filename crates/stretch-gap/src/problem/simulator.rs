@@ -63,12 +63,23 @@ pub struct Run<'a> {
     /// [linearisation](Simulator::linearise) around them, if that costs less than a run. `None` if
     /// the output must be exact.
     pub near: Option<&'a [f64]>,
+    /// Whether the run may use the last runs of a budget, which are reserved for the answer. The
+    /// runs of the search may not.
+    pub may_use_reserve: bool,
 }
 
 impl<'a> Run<'a> {
     /// Describes an exact run on the measured inputs, with the usual step.
     pub fn exact(stage: usize, model: &'a Model, trials: usize) -> Self {
-        Self { stage, model, trials, input_noise: None, step: 1.0, near: None }
+        Self {
+            stage,
+            model,
+            trials,
+            input_noise: None,
+            step: 1.0,
+            near: None,
+            may_use_reserve: true,
+        }
     }
 }
 
@@ -141,15 +152,15 @@ pub trait Simulator: Sync {
         false
     }
 
-    /// Computes the sensitivities of a stage to its nominal parameters around a model. Later runs
-    /// that are [near](Run::near) this model may use them. The diagnosis calls this between
+    /// Computes the sensitivities of a stage to its nominal parameters around a run. Later runs
+    /// that are [near](Run::near) its model may use them. The diagnosis calls this between
     /// searches, never during one, so that the answer does not depend on the threads. By default
     /// nothing is computed, and every run is exact.
     ///
     /// # Errors
     /// The simulation is not possible with these values.
-    fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
-        let _ = (stage, model, trials);
+    fn linearise(&self, run: Run<'_>) -> Result<(), GapError> {
+        let _ = run;
         Ok(())
     }
 

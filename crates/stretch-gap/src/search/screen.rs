@@ -75,7 +75,7 @@ impl Ground {
         let parts: Result<Vec<_>, GapError> = (0..stages)
             .into_par_iter()
             .map(|s| {
-                compare.runs.simulator().linearise(s, &model, compare.roles.fit_trials)?;
+                compare.runs.linearise(s, &model, compare.roles.fit_trials)?;
                 let residual = compare.residual(s, &model)?;
                 let known = compare.nominal_sensitivities(s, &model, &residual)?;
                 let solved = compare.solved(s, &known, &residual);

@@ -13,7 +13,11 @@ use rayon::prelude::*;
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    problem::{error::GapError, simulator::Model, thresholds::Thresholds},
+    problem::{
+        error::{GapError, if_possible},
+        simulator::Model,
+        thresholds::Thresholds,
+    },
     search::{
         acceptance::Acceptance,
         screen::{Ground, Screened},
@@ -90,11 +94,11 @@ impl<'a> Search<'a> {
 
     /// Returns the same search for the same problem with other nuisances. Fits start from the
     /// previous results.
-    pub(crate) fn again<'b>(self, problem: &'b PreparedProblem<'b>) -> Search<'b>
+    pub(crate) fn again<'b>(&self, problem: &'b PreparedProblem<'b>) -> Search<'b>
     where
         'a: 'b,
     {
-        let sets = Sets::after(problem, self.sets);
+        let sets = Sets::after(problem, &self.sets);
         Search { sets, ..Search::new(problem, self.acceptance.thresholds, self.depth) }
     }
 
@@ -242,40 +246,49 @@ impl<'a> Search<'a> {
         Ok(set)
     }
 
-    /// Extends a set by forward selection, then removes weak effects by backward elimination.
+    /// Extends a set by forward selection, then removes weak effects by backward elimination. If
+    /// the budget of runs is used up, returns what was found until then.
     fn grow(&mut self, from: Hypothesis, progress: &dyn Fn(&str)) -> Result<Hypothesis, GapError> {
         let mut best = from;
-        for round in best.effects.len()..self.depth {
-            if self.problem.is_spent() {
-                break;
-            }
-            progress(&format!("screening effects, round {}", round + 1));
-            let looked = self.look(&best)?;
-            let Looked { ground, screened } = &*looked;
-            let kept = if round == 0 { KEPT } else { KEPT_LATER };
-            let deviating = self.acceptance.deviating(&best)?;
-            let base = (&best, &deviating);
-            let list = self.shortlist(base, screened, kept);
-            progress(&format!("fitting {} candidates, round {}", list.len(), round + 1));
-            let mut next = self.first_accepted(base, ground, &list)?;
-            let is_open = self.problem.gap(&best) > self.acceptance.thresholds.null_excess;
-            if next.is_none() && is_open && self.is_thorough && !self.problem.is_spent() {
-                // A screen assumes linear changes. Before a gap is left unexplained, every effect
-                // that could cause it is therefore fitted, whatever its gain in the screen.
-                progress(&format!("fitting the other candidates, round {}", round + 1));
-                let others = self.others(&deviating, screened, &list);
-                let least = |effect| self.least_gain(&best, effect);
-                let others = self.sets.promising(&best, ground, others, least)?;
-                next = self.first_accepted(base, ground, &others)?;
-            }
+        while best.effects.len() < self.depth && !self.problem.is_spent() {
+            let next = if_possible(self.extended(&best, progress))?.flatten();
             let Some(next) = next else { break };
             best = next;
         }
         if best.effects.len() > 1 {
             progress("removing weak effects");
-            best = self.prune(best)?;
+            best = if_possible(self.prune(best.clone()))?.unwrap_or(best);
         }
         Ok(best)
+    }
+
+    /// Returns a set with one more effect; `None` if no effect meets the acceptance criteria.
+    fn extended(
+        &mut self,
+        best: &Hypothesis,
+        progress: &dyn Fn(&str),
+    ) -> Result<Option<Hypothesis>, GapError> {
+        let round = best.effects.len() + 1;
+        progress(&format!("screening effects, round {round}"));
+        let looked = self.look(best)?;
+        let Looked { ground, screened } = &*looked;
+        let kept = if best.effects.is_empty() { KEPT } else { KEPT_LATER };
+        let deviating = self.acceptance.deviating(best)?;
+        let base = (best, &deviating);
+        let list = self.shortlist(base, screened, kept);
+        progress(&format!("fitting {} candidates, round {round}", list.len()));
+        let next = self.first_accepted(base, ground, &list)?;
+        let is_open = self.problem.gap(best) > self.acceptance.thresholds.null_excess;
+        if next.is_some() || !is_open || !self.is_thorough || self.problem.is_spent() {
+            return Ok(next);
+        }
+        // A screen assumes linear changes. Before a gap is left unexplained, every effect that
+        // could cause it is therefore fitted, whatever its gain in the screen.
+        progress(&format!("fitting the other candidates, round {round}"));
+        let others = self.others(&deviating, screened, &list);
+        let least = |effect| self.least_gain(best, effect);
+        let others = self.sets.promising(best, ground, others, least)?;
+        self.first_accepted(base, ground, &others)
     }
 
     /// Returns the extension of `base` with the highest score that meets the acceptance criteria.

@@ -72,8 +72,9 @@ impl<'a> Sets<'a> {
 
     /// Creates an empty collection for the same problem with other nuisances; fits start from the
     /// results of `sets`.
-    pub(crate) fn after(problem: &'a PreparedProblem<'a>, sets: Sets<'_>) -> Self {
-        let before = sets.tried.into_iter().map(|(key, set)| (key, set.model)).collect();
+    pub(crate) fn after(problem: &'a PreparedProblem<'a>, sets: &Sets<'_>) -> Self {
+        let known = sets.tried.iter();
+        let before = known.map(|(key, set)| (key.clone(), set.model.clone())).collect();
         Self { before, ..Self::new(problem) }
     }
 

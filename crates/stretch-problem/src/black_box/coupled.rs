@@ -160,7 +160,7 @@ fn moved<'a>(
     let alterations = std::iter::once(&[][..]).chain(probes.chunks(1));
     let wanted: Vec<Inner> =
         alterations.flat_map(|altered| (0..stages).map(move |s| run(s, altered))).collect();
-    let outputs = runs.outputs(session, &wanted);
+    let outputs = runs.outputs(session, &wanted, 0);
     let (shipped, there) = outputs.split_at(stages);
     let is_moved = |stage: usize, there: &[f64]| {
         let Ok(shipped) = &shipped[stage] else { return false };

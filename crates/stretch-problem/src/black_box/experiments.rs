@@ -225,7 +225,7 @@ impl Laboratory for BlackBox {
             let mut altered: Vec<Altered> = others.chain([own]).collect();
             altered.sort_by_key(|a| a.stage);
             let inner = self.driven_by(&run, altered);
-            let answer = self.runs.outputs(session, &[inner]).pop();
+            let answer = self.runs.outputs(session, &[inner], 0).pop();
             let answer = answer.unwrap_or_else(|| Err(SourceError::Gone("no answer".into())));
             let mut output =
                 answer.map_err(|error| super::refused(error, self.least_runs()))?.to_vec();

@@ -157,6 +157,19 @@ impl BlackBox {
         DRAWS * self.problem.input_noise.iter().filter(is_noisy).count()
     }
 
+    /// Number of runs of the budget that are reserved for the answer.
+    fn reserve(&self) -> usize {
+        let budget = self.runs.budget().unwrap_or(0);
+        let kept = (FINAL.0 + FINAL.1 * self.problem.stages.len()).min(budget / 2);
+        // the noise is drawn again after parameters are re-tuned
+        kept + self.draws()
+    }
+
+    /// Number of runs of the budget that this run may not use.
+    fn kept_back(&self, run: &Run<'_>) -> usize {
+        if run.may_use_reserve { 0 } else { self.reserve() }
+    }
+
     /// Whether an altered input of one stage acts on the outputs of others.
     fn is_coupled(&self) -> bool {
         self.coupled().about.is_some()
@@ -255,7 +268,8 @@ impl Simulator for BlackBox {
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
         let bases: Vec<(Inner, Option<Apart>)> = runs.iter().map(|run| self.base_of(run)).collect();
         let inner: Vec<Inner> = bases.iter().map(|(inner, _)| inner.clone()).collect();
-        let outputs = self.runs.outputs(self.problem.session(), &inner);
+        let kept_back = runs.iter().map(|run| self.kept_back(run)).max().unwrap_or(0);
+        let outputs = self.runs.outputs(self.problem.session(), &inner, kept_back);
         let least = self.least_runs();
         let each = runs.iter().zip(&bases).zip(outputs).zip(outs);
         each.map(|(((run, (_, line)), output), out)| {
@@ -269,8 +283,8 @@ impl Simulator for BlackBox {
         .collect()
     }
 
-    fn linearise(&self, stage: usize, model: &Model, trials: usize) -> Result<(), GapError> {
-        let run = Run::exact(stage, model, trials);
+    fn linearise(&self, run: Run<'_>) -> Result<(), GapError> {
+        let stage = run.stage;
         let inner = self.inner(&run);
         let about = self.problem.description();
         let own = &about.stages[stage].parameters;
@@ -280,9 +294,8 @@ impl Simulator for BlackBox {
         let moves = Linear::moves(&inner, own, &about.parameters);
         let wanted: Vec<Inner> =
             std::iter::once(&inner).chain(moves.iter().map(|m| &m.inner)).cloned().collect();
-        let outputs: Result<Vec<_>, SourceError> =
-            self.runs.outputs(self.problem.session(), &wanted).into_iter().collect();
-        match outputs {
+        let outputs = self.runs.outputs(self.problem.session(), &wanted, self.kept_back(&run));
+        match outputs.into_iter().collect::<Result<Vec<_>, SourceError>>() {
             Ok(outputs) => {
                 self.undeclared.look(&self.problem, &self.runs, (&inner, &moves), &outputs);
                 let mut lines = self.lines.write().unwrap_or_else(PoisonError::into_inner);
@@ -305,9 +318,7 @@ impl Simulator for BlackBox {
 
     fn model_runs(&self) -> Option<ModelRuns> {
         let (count, budget) = (self.runs.count(), self.runs.budget());
-        let kept = (FINAL.0 + FINAL.1 * self.problem.stages.len()).min(budget.unwrap_or(0) / 2);
-        // the noise is drawn again after parameters are re-tuned
-        let is_spent = budget.is_some_and(|budget| count + kept + self.draws() >= budget);
+        let is_spent = budget.is_some_and(|budget| count + self.reserve() >= budget);
         Some(ModelRuns { count, budget, is_spent })
     }
 

@@ -165,12 +165,18 @@ impl Runs {
         })
     }
 
-    /// Outputs of some runs; new runs are made in one batch.
+    /// Outputs of some runs; new runs are made in one batch. The last `reserve` runs of the budget
+    /// are not used.
     ///
     /// If another thread is making a run, this call waits for it. The source is called from a
     /// separate thread, so that a parallel iterator in the source cannot steal work that waits for
     /// that same source.
-    pub(crate) fn outputs(&self, session: &RecordedSession, wanted: &[Inner]) -> Vec<Answer> {
+    pub(crate) fn outputs(
+        &self,
+        session: &RecordedSession,
+        wanted: &[Inner],
+        reserve: usize,
+    ) -> Vec<Answer> {
         let keys: Vec<Key> = wanted.iter().map(|run| self.key(run)).collect();
         let mut out: Vec<Option<Answer>> = vec![None; wanted.len()];
         loop {
@@ -185,7 +191,7 @@ impl Runs {
                     out[i] = Some(answer);
                 } else if made.under_way.contains(key) {
                     waits = true;
-                } else if self.budget.is_some_and(|budget| made.count >= budget) {
+                } else if self.budget.is_some_and(|budget| made.count + reserve >= budget) {
                     let budget = self.budget.unwrap_or(0);
                     out[i] = Some(Err(SourceError::Spent { budget }));
                 } else {

@@ -199,6 +199,19 @@ fn each_hidden_effect_is_named_within_four_hundred_runs() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// The search stops before the runs that the answer needs, so that what it found is not lost,
+/// wherever the budget ends.
+#[test]
+fn no_budget_loses_what_was_found() {
+    for budget in [250, 300, 350, 500, 800, 1000] {
+        let (_, plant) = hidden().into_iter().rfind(|(name, _)| *name == "input.profile").unwrap();
+        let wrap: Vec<&str> = MANY.into_iter().chain(["input.profile"]).collect();
+        let (diagnosis, runs) = diagnosed(problem(recorded(plant), &wrap), Some(budget));
+        assert_eq!(diagnosis.named, ["input.profile"], "{budget}: {}", diagnosis.sentence);
+        assert!(runs <= budget, "{runs} of {budget}");
+    }
+}
+
 /// A black box of which the engine uses only the basic methods, so that every simulation is a run,
 /// as for any simulator.
 struct Plain<'a>(&'a BlackBox);

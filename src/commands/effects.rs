@@ -4,6 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
+use stretch_data::in_digits;
 use stretch_effects::{
     Effect, EffectParameter, Extent, Grid, KINDS, Kind, Language, Quantity, Role, Signals, Sketch,
     kind_named,
@@ -175,11 +176,7 @@ fn typical_code(entry: &Entry, language: Language) -> anyhow::Result<String> {
 
 /// Formats the range of a parameter, with its unit if it has one: `h: 0 .. 0.6`.
 fn range(p: &EffectParameter) -> String {
-    let number = |x: f64| {
-        // Four significant digits are enough, for example for one third.
-        let x = format!("{x:.3e}").parse().unwrap_or(x);
-        if x != 0.0 && x.abs() < 1e-3 || x.abs() >= 1e6 { format!("{x:e}") } else { format!("{x}") }
-    };
+    let number = |x: f64| in_digits(x, 4);
     let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
     let default = match p.role {
         Role::Strength { .. } => String::new(),

@@ -1,6 +1,7 @@
 //! Errors of calibrations.
 
 use stretch_core::{DesignError, Label};
+use stretch_data::in_digits;
 use stretch_filter::FilterError;
 use stretch_fit::FitError;
 use stretch_receptor::ReceptorError;
@@ -183,7 +184,7 @@ pub enum CalibrateError {
     #[error(
         "in integers the estimate of {reference} is in thousandths of its unit, and {} of that unit do not fit 32 bits: convert \
          {reference} to a larger unit, such as kN instead of N, and calibrate again",
-        four_digits(*.largest)
+        in_digits(*.largest, 4)
     )]
     FixedRange {
         /// Column of the reference.
@@ -195,8 +196,8 @@ pub enum CalibrateError {
     #[error(
         "the signal {signal} of the trials is between {} and {}, but the converter measures from {zero_v} to {full_scale_v}{}: this is not \
          the board's converter; {GIVE_ADC}",
-        four_digits(*.min),
-        four_digits(*.max),
+        in_digits(*.min, 4),
+        in_digits(*.max, 4),
         if *.codes > 0.0 { format!(", in which the signal has only {codes:.1} codes") } else { String::new() }
     )]
     OutsideConverter {
@@ -276,15 +277,6 @@ pub(crate) const PACE_TOLERANCE: f64 = 0.2;
 /// Returns the advice to fit a line, except for the models of `stretch-sleeve`, which replace `--model`.
 fn or_linear(model: &str) -> &'static str {
     if matches!(model, "array" | "prior") { "" } else { ", or fit --model linear" }
-}
-
-/// Formats four significant digits without trailing zeros.
-pub(crate) fn four_digits(x: f64) -> String {
-    let rounded: f64 = format!("{x:.3e}").parse().unwrap_or(x);
-    if rounded != 0.0 && !(1e-4..1e7).contains(&rounded.abs()) {
-        return format!("{rounded:e}");
-    }
-    rounded.to_string()
 }
 
 /// Explains why no sample of a trial has an estimate. If samples come more slowly than a calibration expects, samples

@@ -3,6 +3,7 @@
 
 mod column;
 mod data_set;
+mod digits;
 mod error;
 mod even;
 mod even_session;
@@ -18,6 +19,7 @@ mod write;
 
 pub use column::{Quantity, spelt_unit, unit, unit_of, written_unit};
 pub use data_set::{DataSet, Split, TrialEntry, TrialKind, digest_of, is_digest};
+pub use digits::{in_digits, significant};
 pub use error::{DataError, Place, listed, nearest, shown};
 pub use even::{Even, EvenPart, EvenSpec, Rows};
 pub use even_session::{EvenSession, EvenTrial, SessionTrial};

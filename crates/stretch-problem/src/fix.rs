@@ -2,7 +2,7 @@
 
 use std::{f64::consts::TAU, path::Path};
 
-use stretch_data::{Remarks, RigFile};
+use stretch_data::{Remarks, RigFile, in_digits};
 use stretch_effects::EffectParameter;
 use stretch_gap::{
     Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Model, Run, SampleRoles, Simulator,
@@ -164,9 +164,9 @@ impl<'a> Chosen<'a> {
         let sd = self.sd.get(index).copied().unwrap_or(0.0);
         format!(
             "was {}; 95 %: {} .. {}{}",
-            digits(was),
-            digits(value - COVERS * sd),
-            digits(value + COVERS * sd),
+            in_digits(was, 4),
+            in_digits(value - COVERS * sd, 4),
+            in_digits(value + COVERS * sd, 4),
             of_unit(unit)
         )
     }
@@ -242,28 +242,13 @@ pub(crate) fn names(file: &RigFile) -> Vec<String> {
 
 /// The comment behind a parameter of an effect.
 fn effect_remark(p: &EffectValue) -> String {
-    let [low, high] = p.interval.map(digits);
+    let [low, high] = p.interval.map(|x| in_digits(x, 4));
     let form = if p.is_form { "form; " } else { "" };
     format!("{form}95 %: {low} .. {high}{}", of_unit(&p.unit))
 }
 
 fn of_unit(unit: &str) -> String {
     if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
-}
-
-/// Rounds a number to four significant digits.
-pub(crate) fn rounded(x: f64) -> f64 {
-    format!("{x:.3e}").parse().unwrap_or(x)
-}
-
-/// Writes a number with four significant digits.
-pub(crate) fn digits(x: f64) -> String {
-    let rounded = rounded(x);
-    if rounded != 0.0 && !(1e-3..1e6).contains(&f64::abs(rounded)) {
-        format!("{rounded:e}")
-    } else {
-        format!("{rounded}")
-    }
 }
 
 /// Replaces the amplitude and phase of an effect's spectral line by values from the recording, as a
@@ -371,10 +356,5 @@ mod tests {
         assert_abs_diff_eq!(a * phase.sin(), 0.02 * 0.7_f64.sin(), epsilon = 1e-6);
         let [a, _] = sine(60.0, &wave(60.0, &|t| 2.0 * t));
         assert!(a > 0.015, "{a}");
-    }
-
-    #[test]
-    fn numbers_have_four_digits() {
-        assert_eq!([0.0, 0.123456, 1e-9, 12345.678].map(digits), ["0", "0.1235", "1e-9", "12350"]);
     }
 }

@@ -1,9 +1,10 @@
 //! The effects that a diagnosis names, as code to type into a simulator.
 
+use stretch_data::in_digits;
 use stretch_gap::{Diagnosis, EffectSpec, EffectValue, Evidence};
 use stretch_sim::{Effect, Language, Sketch, Surroundings};
 
-use crate::fix::{Chosen, digits};
+use crate::fix::Chosen;
 
 /// A named effect with the numbers that were fitted: its equation, its initial state, and its code.
 #[derive(Debug, Clone)]
@@ -78,6 +79,6 @@ pub(crate) fn implementations(
 /// A number with its unit and its 95 % interval.
 fn with_interval(p: &EffectValue) -> String {
     let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
-    let [low, high] = p.interval.map(digits);
-    format!("{} = {}{unit} ({low} .. {high})", p.name, digits(p.value))
+    let [low, high] = p.interval.map(|x| in_digits(x, 4));
+    format!("{} = {}{unit} ({low} .. {high})", p.name, in_digits(p.value, 4))
 }

@@ -5,7 +5,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use stretch_data::{Quantity, Trial, ends, toml_comment, unit};
+use stretch_data::{Quantity, Trial, ends, significant, toml_comment, unit};
 use stretch_gap::Noise;
 use stretch_recording::{ReadOptions, Recording};
 
@@ -230,7 +230,7 @@ fn stage(columns: &[Known], trials: &[(String, Trial)]) -> String {
     out += &match noise(own, &commands, trials) {
         Some(noise) => format!(
             "noise = {}  # one standard deviation, measured: {}\n",
-            rounded(noise.sd()),
+            significant(noise.sd(), 3),
             noise.source()
         ),
         None => "# noise = 0.01     # one standard deviation, if the noise is known; otherwise it is estimated from the recordings\n".to_owned(),
@@ -285,12 +285,6 @@ fn noise(output: &str, commands: &[&str], trials: &[(String, Trial)]) -> Option<
     let (output, commands) = (of(output), commands.iter().map(|c| of(c)).collect::<Vec<_>>());
     let commands: Vec<&[f64]> = commands.iter().map(Vec::as_slice).collect();
     Noise::of_rests(&output, &commands, &ranges, dt_s)
-}
-
-/// Rounds to three significant digits.
-fn rounded(x: f64) -> f64 {
-    let unit = 10.0_f64.powi(x.log10().floor() as i32 - 2);
-    (x / unit).round() * unit
 }
 
 /// Whether each recording is kept for testing: the last quarter, the shorter of two, none of one.

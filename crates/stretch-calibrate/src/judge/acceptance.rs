@@ -1,9 +1,9 @@
 //! Acceptance criteria: whether a calibration can be used, and whether a log belongs to it.
 
 use stretch_core::{Label, Provenance};
-use stretch_data::Trial;
+use stretch_data::{Trial, in_digits};
 
-use crate::{error::four_digits, fit::FitReport, prepare::without_gross_errors};
+use crate::{fit::FitReport, prepare::without_gross_errors};
 
 use super::evaluate::MethodErrors;
 
@@ -94,7 +94,7 @@ pub(super) fn off_throughout(errors: &MethodErrors, fit_rmse: f64, unit: &str) -
     let alike = ALIKE * fit_rmse;
     let is_shift = unshifted <= bias.abs() || (unshifted <= alike && alike < rmse);
     (is_far && is_shift).then(|| {
-        let with_unit = |x: f64| format!("{} {unit}", four_digits(x)).trim_end().to_owned();
+        let with_unit = |x: f64| format!("{} {unit}", in_digits(x, 4)).trim_end().to_owned();
         let side = if bias > 0.0 { "above" } else { "below" };
         format!(
             "was the sensor put on again? The estimate is shifted: it is {} {side} the reference on average. Without this shift, the \

@@ -1,6 +1,6 @@
 //! Explanations of the choice of a model.
 
-use crate::error::four_digits;
+use stretch_data::in_digits;
 
 use super::model_choice::Found;
 
@@ -29,7 +29,7 @@ pub(crate) struct Grounds<'a> {
 /// Returns a sentence with the figures that were compared and the rule that decided.
 pub(crate) fn why(grounds: &Grounds<'_>) -> String {
     let Grounds { best, second, simplest, excess, insured, unit, memory_shows, as_good } = grounds;
-    let error = |seen: &Found| format!("{} {unit}", four_digits(seen.rmse)).trim_end().to_owned();
+    let error = |seen: &Found| format!("{} {unit}", in_digits(seen.rmse, 4)).trim_end().to_owned();
     // The form with a tracked baseline does not take part in this comparison.
     let chosen = insured.map_or(String::new(), |seen| format!("{}: ", seen.kind));
     let mut sentence = if simplest.kind == best.kind {

@@ -6,6 +6,7 @@ use serde::Serialize;
 use stretch_core::{
     Calibration, DesignError, Interval, Label, Model, RateEstimator, Runner, Stage, record,
 };
+use stretch_data::in_digits;
 use stretch_receptor::{
     ReceptorError, Withheld,
     code::{
@@ -14,7 +15,7 @@ use stretch_receptor::{
     },
 };
 
-use crate::{CalibrateError, SpellingError, error::four_digits};
+use crate::{CalibrateError, SpellingError};
 
 /// Buffer size for the largest file, an observer in which every number has its greatest length.
 const BYTES: usize = 1024;
@@ -156,8 +157,8 @@ pub fn converter_reach(
     Ok(Some(format!(
         "the calibrated range of {signal} is from {} to {}, and the converter measures from {zero_v} to {full_scale_v}, {what}; if this is \
          not the board's converter, {GIVE_ADC}",
-        four_digits(min),
-        four_digits(max)
+        in_digits(min, 4),
+        in_digits(max, 4)
     )))
 }
 

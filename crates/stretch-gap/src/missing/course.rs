@@ -22,8 +22,9 @@ use std::f64::consts::TAU;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use stretch_data::in_digits;
 
-use crate::missing::{jitter::jitter_sd_s, proposed::three_digits};
+use crate::missing::jitter::jitter_sd_s;
 
 /// Share of the power above the noise that a course has to explain.
 const SHARE: f64 = 0.5;
@@ -111,30 +112,30 @@ impl Course {
 
     /// Describes the course in words, with the unit of the channel.
     pub(crate) fn words(&self, unit: &str) -> String {
-        let sized = |size: f64| format!("{} {unit}", three_digits(size)).trim_end().to_owned();
+        let sized = |size: f64| format!("{} {unit}", in_digits(size, 3)).trim_end().to_owned();
         match *self {
             Self::Jitters { sd_s } => format!(
                 "time stamps jitter by about {} ms, which is noise that follows the rate",
-                three_digits(1e3 * sd_s)
+                in_digits(1e3 * sd_s, 3)
             ),
             Self::Swings { hertz, amplitude } => {
                 format!(
                     "it oscillates at {} Hz with an amplitude of {}",
-                    three_digits(hertz),
+                    in_digits(hertz, 3),
                     sized(amplitude)
                 )
             }
             Self::Jumps { per_s, size } => {
                 format!(
                     "it jumps, about {} times a second, by {}",
-                    three_digits(per_s),
+                    in_digits(per_s, 3),
                     sized(size)
                 )
             }
             Self::Drifts { size, correlation_s } => format!(
                 "it varies by {}, with a correlation time of {} s",
                 sized(size),
-                three_digits(correlation_s)
+                in_digits(correlation_s, 3)
             ),
         }
     }

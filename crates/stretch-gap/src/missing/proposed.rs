@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use stretch_data::in_digits;
 
 use crate::missing::{
     course::Course,
@@ -111,7 +112,7 @@ pub(crate) fn equation(
         .iter()
         .map(|t| {
             let unit = if t.unit.is_empty() { String::new() } else { format!(" {}", t.unit) };
-            format!("{}{unit} {}", three_digits(t.coefficient), t.name)
+            format!("{}{unit} {}", in_digits(t.coefficient, 3), t.name)
         })
         .collect();
     let speaks = |letter: &str, s: &SignalScale| {
@@ -124,20 +125,20 @@ pub(crate) fn equation(
             let unit = if s.unit == "1" { "" } else { s.unit.as_str() };
             letters.push(format!(
                 "x[{name}] = ({name} - {} {unit})/({} {unit})",
-                three_digits(s.offset),
-                three_digits(s.scale)
+                in_digits(s.offset, 3),
+                in_digits(s.scale, 3)
             ));
         } else if speaks("x", s) {
             letters.push(format!("x[{name}] = {name}"));
         }
         if speaks("v", s) {
-            let rate = three_digits(s.rate_per_s * s.scale);
+            let rate = in_digits(s.rate_per_s * s.scale, 3);
             letters.push(format!("v[{name}] = (d {name}/dt)/({rate} {}/s)", s.unit));
         }
     }
     for (letter, scale_s) in ["T_trial", "T_session"].into_iter().zip(time_scales_s) {
         if terms.iter().any(|t| t.name.contains(letter)) {
-            letters.push(format!("{letter} = {} s", three_digits(scale_s)));
+            letters.push(format!("{letter} = {} s", in_digits(scale_s, 3)));
         }
     }
     let with = if letters.is_empty() { String::new() } else { format!("; {}", letters.join(", ")) };
@@ -150,8 +151,8 @@ pub(crate) fn words(term: &Term, signals: &[SignalScale]) -> String {
     let product = if factors.is_empty() { "1".to_owned() } else { factors.join(" ") };
     match term.passage {
         Passage::Direct => product,
-        Passage::Lag { tau_s } => format!("lag({product}, {} s)", three_digits(tau_s)),
-        Passage::Leak { tau_s } => format!("leak({product}, {} s)", three_digits(tau_s)),
+        Passage::Lag { tau_s } => format!("lag({product}, {} s)", in_digits(tau_s, 3)),
+        Passage::Leak { tau_s } => format!("leak({product}, {} s)", in_digits(tau_s, 3)),
     }
 }
 
@@ -162,25 +163,25 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
     match factor {
         Factor::Power { signal, power } => raised(format!("max(0, {})", x(signal)), power),
         Factor::Centred { signal, at, power } => {
-            raised(format!("({} - {})", x(signal), three_digits(at)), f64::from(power))
+            raised(format!("({} - {})", x(signal), in_digits(at, 3)), f64::from(power))
         }
         Factor::Above { signal, at, power } => {
-            raised(format!("max(0, {} - {})", x(signal), three_digits(at)), power)
+            raised(format!("max(0, {} - {})", x(signal), in_digits(at, 3)), power)
         }
         Factor::Below { signal, at, power } => {
-            raised(format!("max(0, {} - {})", three_digits(at), x(signal)), power)
+            raised(format!("max(0, {} - {})", in_digits(at, 3), x(signal)), power)
         }
         Factor::Low { signal, width } => {
-            format!("exp(-max(0, {})/{})", x(signal), three_digits(width))
+            format!("exp(-max(0, {})/{})", x(signal), in_digits(width, 3))
         }
         Factor::High { signal, width } => {
-            format!("exp(-max(0, 1 - {})/{})", x(signal), three_digits(width))
+            format!("exp(-max(0, 1 - {})/{})", x(signal), in_digits(width, 3))
         }
         Factor::Sine { signal, turns } => {
-            format!("sin(2 pi {} {})", three_digits(turns), x(signal))
+            format!("sin(2 pi {} {})", in_digits(turns, 3), x(signal))
         }
         Factor::Cosine { signal, turns } => {
-            format!("cos(2 pi {} {})", three_digits(turns), x(signal))
+            format!("cos(2 pi {} {})", in_digits(turns, 3), x(signal))
         }
         Factor::Rate { signal, form } => match form {
             RateForm::Linear => v(signal),
@@ -194,13 +195,13 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
         },
         Factor::Bend { signal } => format!("step({})", v(signal)),
         Factor::Play { signal, width } => {
-            format!("({0} - play({0}, {1}))", x(signal), three_digits(width))
+            format!("({0} - play({0}, {1}))", x(signal), in_digits(width, 3))
         }
         Factor::Lag { signal, tau_s } => {
-            format!("({0} - lag({0}, {1} s))", x(signal), three_digits(tau_s))
+            format!("({0} - lag({0}, {1} s))", x(signal), in_digits(tau_s, 3))
         }
         Factor::Late { signal, delay_s } => {
-            format!("({0}(t - {1} s) - {0})", x(signal), three_digits(delay_s))
+            format!("({0}(t - {1} s) - {0})", x(signal), in_digits(delay_s, 3))
         }
         Factor::Peak { signal } => format!("(greatest {0} - {0})", x(signal)),
         Factor::Turned { signal, width } => {
@@ -208,15 +209,15 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
                 "sign({}) (1 - exp(-travel since reversal of {}/{}))",
                 v(signal),
                 x(signal),
-                three_digits(width)
+                in_digits(width, 3)
             )
         }
         Factor::Travel { signal, power } => raised(format!("travel({})", x(signal)), power),
         Factor::TravelFade { signal, width } => {
-            format!("exp(-travel({})/{})", x(signal), three_digits(width))
+            format!("exp(-travel({})/{})", x(signal), in_digits(width, 3))
         }
         Factor::Time { power } => raised("(time in trial/T_trial)".into(), power),
-        Factor::TimeFade { tau_s } => format!("exp(-time in trial/{} s)", three_digits(tau_s)),
+        Factor::TimeFade { tau_s } => format!("exp(-time in trial/{} s)", in_digits(tau_s, 3)),
         Factor::Session { power } => raised("(session time/T_session)".into(), power),
     }
 }
@@ -265,20 +266,7 @@ fn slow(proposed: &Proposed) -> String {
     format!(
         " The time constant of {} s is longer than the {} s that were fitted of the longest recording, so the cause may also be a drift or \
          an integral.",
-        three_digits(longest_s),
-        three_digits(fitted_s)
+        in_digits(longest_s, 3),
+        in_digits(fitted_s, 3)
     )
-}
-
-/// Formats a number with three significant digits.
-pub(super) fn three_digits(x: f64) -> String {
-    let size = x.abs();
-    if size == 0.0 {
-        return "0".into();
-    }
-    let digits = (2 - size.log10().floor() as i32).clamp(0, 12) as usize;
-    match size {
-        1e-6..1e6 => format!("{x:.digits$}"),
-        _ => format!("{x:.2e}"),
-    }
 }

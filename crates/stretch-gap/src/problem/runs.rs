@@ -9,6 +9,8 @@ use std::{
     },
 };
 
+use stretch_data::in_digits;
+
 use crate::problem::{
     error::{GapError, unless_lost},
     simulator::{Model, ModelRuns, Run, Simulator},
@@ -272,7 +274,7 @@ impl<'a> Runs<'a> {
     fn asked(&self, run: Run<'_>) -> String {
         let (specs, effects) = (self.simulator.parameters(), self.simulator.effects());
         let one = |name: &str, value: f64, unit: &str| {
-            let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+            let rounded = in_digits(value, 4);
             format!("{name} = {rounded} {}", if unit == "1" { "" } else { unit })
                 .trim_end()
                 .to_owned()

@@ -1,5 +1,7 @@
 //! Describes errors of the recording and of the rig file in words, with what a user should check.
 
+use stretch_data::in_digits;
+
 use crate::{
     fit::hypothesis::Hypothesis,
     problem::{column::Column, record_facts::nouns, simulator::Simulator},
@@ -49,7 +51,7 @@ impl Gross {
                 "{} is a copy of {} ({} times it, noise and all)",
                 column.name,
                 source.name,
-                short(factor)
+                in_digits(factor, 4)
             ),
             hint: "check which channels the recorder wrote into the two columns".into(),
             ..Self::of_column(GrossKind::Copied, column)
@@ -84,7 +86,7 @@ impl Gross {
     fn of_factor(column: &Column<'_>, factor: f64, units: Option<String>, is_exact: bool) -> Self {
         let or = if is_exact { ", or give the parameters tolerances" } else { "" };
         let that_is = units.as_ref().map_or(String::new(), |units| format!(": that is {units}"));
-        let ratio = short(1.0 / factor);
+        let ratio = in_digits(1.0 / factor, 4);
         Self {
             factor: Some(factor),
             sentence: format!(
@@ -114,8 +116,8 @@ impl Gross {
                 sentence: format!(
                     "{} is {}{unit} on the {rig}, and {} in the {simulator}",
                     spec.name,
-                    short(value),
-                    short(spec.nominal)
+                    in_digits(value, 4),
+                    in_digits(spec.nominal, 4)
                 ),
                 hint: format!(
                     "correct the parameter of the {simulator}, or the setting of the {rig}"
@@ -148,7 +150,7 @@ impl Gross {
                     offset: Some(size),
                     sentence: format!(
                         "{name} lies {} {} too {side}",
-                        short(size.abs()),
+                        in_digits(size.abs(), 4),
                         column.unit
                     ),
                     ..Self::of_column(GrossKind::Offset, column)
@@ -171,20 +173,6 @@ impl Gross {
                 ..Self::of_column(GrossKind::Sign, column)
             },
         })
-    }
-}
-
-/// Formats a number with four significant digits, without an exponent if none is needed.
-fn short(x: f64) -> String {
-    let size = x.abs();
-    if size != 0.0 && !(1e-3..1e5).contains(&size) {
-        return format!("{x:.3e}");
-    }
-    let digits = (3 - size.max(1e-3).log10().floor() as i32).max(0) as usize;
-    let text = format!("{x:.digits$}");
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
     }
 }
 

@@ -1,6 +1,8 @@
 //! Notes about a verdict: gross errors, implausible noise, oscillating parameters, extrapolated
 //! drift, and effects that would have been named.
 
+use stretch_data::in_digits;
+
 use crate::{
     evidence::{
         candidates::multiple,
@@ -318,7 +320,7 @@ pub(crate) fn detection_limit_note(
     let one = |note: Note, (i, (_, limit)): (usize, &(f64, &DetectionLimit))| {
         let unit = if limit.unit == "1" { String::new() } else { format!(" {}", limit.unit) };
         let note = note.text(if i == 0 { "" } else { ", " }).effect(&limit.effect);
-        note.text(format!(" {}{unit}", in_digits(limit.strength.unwrap_or(0.0))))
+        note.text(format!(" {}{unit}", in_digits(limit.strength.unwrap_or(0.0), 2)))
     };
     let begin = Note::default()
         .text("An effect would have been named if it were stronger than its limit: ");
@@ -326,13 +328,6 @@ pub(crate) fn detection_limit_note(
     let rest = if known.len() > LISTED { ", and more in the table" } else { "" };
     let how = format!("{rest} (with probability 0.9, by linearised draws).");
     (!known.is_empty()).then(|| listed.text(how))
-}
-
-/// Formats a number with two digits.
-fn in_digits(x: f64) -> String {
-    let rounded: f64 = format!("{x:.1e}").parse().unwrap_or(x);
-    let is_long = rounded != 0.0 && (rounded.abs() < 1e-3 || rounded.abs() >= 1e5);
-    if is_long { format!("{rounded:e}") } else { format!("{rounded}") }
 }
 
 #[cfg(test)]
@@ -365,6 +360,5 @@ mod tests {
         );
         assert!(words.contains("e3") && !words.contains("e2") && words.contains("in the table"));
         assert_eq!(detection_limit_note(&limits[..1], &effects), None);
-        assert_eq!(in_digits(2.04e-11), "2e-11");
     }
 }

@@ -3,12 +3,12 @@
 
 use std::num::NonZeroUsize;
 
-use stretch_data::{EffectEntry, Remarks};
+use stretch_data::{EffectEntry, Remarks, significant};
 use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator, next_experiment};
 
 use super::{BlackBox, catalogue::Acting, spec::ProblemSpec};
 use crate::{
-    fix::{Chosen, Fix, Fixed, Meaning, NoFix, rounded},
+    fix::{Chosen, Fix, Fixed, Meaning, NoFix},
     implement::Implementation,
     problem::Diagnosable,
 };
@@ -100,7 +100,7 @@ impl Diagnosable for BlackBox {
         file.budget = file.budget.or(self.runs.budget().and_then(NonZeroUsize::new));
         // a prediction and the next diagnosis use the noise of this diagnosis
         for (stage, found) in file.stages.iter_mut().zip(&evidence.stages) {
-            stage.noise.get_or_insert(rounded(found.noise));
+            stage.noise.get_or_insert(significant(found.noise, 4));
         }
         let is_bare = chosen.effects(&self.description().effects).next().is_none();
         let tuned = file.parameters.iter_mut().zip(&chosen.model.parameters).enumerate();

@@ -1,0 +1,25 @@
+//! Numbers in sentences: rounded to significant digits.
+
+/// Rounds a number to significant digits. A number that is not finite stays as it is.
+///
+/// ```
+/// assert_eq!(stretch_data::significant(0.012_345, 3), 0.0123);
+/// ```
+pub fn significant(x: f64, digits: usize) -> f64 {
+    format!("{x:.*e}", digits.saturating_sub(1)).parse().unwrap_or(x)
+}
+
+/// Writes a number with at most `digits` significant digits, without trailing zeros: in plain
+/// notation from 0.0001 to a million, otherwise with an exponent.
+///
+/// ```
+/// let text = [2.10004, 12_345.678, 1.5e-9, 0.0].map(|x| stretch_data::in_digits(x, 4));
+/// assert_eq!(text, ["2.1", "12350", "1.5e-9", "0"]);
+/// ```
+pub fn in_digits(x: f64, digits: usize) -> String {
+    let rounded = significant(x, digits);
+    match rounded == 0.0 || (1e-4..1e6).contains(&rounded.abs()) {
+        true => rounded.to_string(),
+        false => format!("{rounded:e}"),
+    }
+}

@@ -37,7 +37,7 @@ pub mod toolkit {
             LinearFactor, RowAccumulator, SETTLE, Solution, StateDesign, States, TermRows,
             leave_one_out,
         },
-        judge::{Estimates, MAX_LAG_S, Methods, evaluate_methods},
+        judge::{Estimates, MAX_LAG_S, MOST_MISSING, Methods, cadence, evaluate_methods},
         prepare::{even, even_signals, extent, noise, pooled_range, provenance, sample_rate_hz},
     };
 }

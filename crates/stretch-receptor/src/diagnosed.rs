@@ -404,11 +404,8 @@ impl<T: Real> Live for Diagnosed<T> {
         begun
     }
 
-    /// Forgets everything except baseline, pressure, and the travel of the gauge.
-    fn forget(&self, memory: &mut DiagnosedMemory<T>) {
-        let (baseline, pressure) = (memory.baseline, memory.pressure);
-        let fresh = self.memory();
-        let defects = fresh.defects.as_worked(&memory.defects);
-        *memory = DiagnosedMemory { baseline, pressure, defects, ..fresh };
+    /// The variance of target and rate grows, so that the next sample counts more than the prediction.
+    fn pause(&self, memory: &mut DiagnosedMemory<T>) {
+        self.bridge(memory, 0);
     }
 }

@@ -5,9 +5,9 @@ use stretch_filter::LARGEST_SAMPLE;
 
 use crate::Withheld;
 
-/// Largest number of missing samples in a row that are bridged by prediction. After a further missing sample the model
-/// forgets its state: a model with a rate estimator warms up again; an observer answers at once, but its estimates
-/// settle within about a second.
+/// Largest number of missing samples in a row that are bridged by prediction. After a further missing sample a model
+/// assumes that the target rests where it was: the memory of the sensor (plays and relaxations) is kept and relaxes, an
+/// observer answers the next sample at once, and a model with a rate estimator warms up again.
 pub const MAX_BRIDGED: u8 = 3;
 
 /// A model behind a [`Front`].
@@ -35,8 +35,8 @@ pub trait Live: Design {
     /// Bridges the `nth` missing sample in a row. Returns whether the model can bridge it.
     fn bridge(&self, memory: &mut Self::Memory, nth: u8) -> bool;
 
-    /// Forgets the state that a long gap makes invalid. By default this is the whole state.
-    fn forget(&self, memory: &mut Self::Memory) {
+    /// Takes a missing sample that is not bridged. By default the model starts again.
+    fn pause(&self, memory: &mut Self::Memory) {
         *memory = self.memory();
     }
 }
@@ -78,8 +78,8 @@ impl Side for Branch {
 ///
 /// - A missing sample (a NaN, an infinity, a magnitude beyond [`LARGEST_SAMPLE`], a code that the converter does not
 ///   have) gives [`Withheld::Missing`] and never enters the memory. For up to [`MAX_BRIDGED`] missing samples in a row
-///   the model continues by its own prediction. After a further missing sample the model forgets its state, but not the
-///   branch.
+///   the model continues by its own prediction. During further missing samples, the target is assumed to rest, and a
+///   rate estimator starts again.
 /// - Until the model can answer, a sample gives [`Withheld::Warming`]. An observer answers from the first sample on.
 /// - The branch before the first movement is [`Branch::Inflation`] unless [`ReceptorMemory::starting_on`] sets another.
 ///   It changes when a rate leaves the dead band.
@@ -148,14 +148,14 @@ impl<M> Front<M> {
 }
 
 impl<M: Live> Front<M> {
-    /// Bridges a short gap; forgets the stream after a long gap.
+    /// Bridges a short gap, and pauses during a longer one.
     #[cold]
     #[inline(never)]
     fn missed(&self, memory: &mut ReceptorMemory<M::Memory, M::Side>) {
         memory.missing = memory.missing.saturating_add(1);
         let short = memory.missing <= MAX_BRIDGED;
         if !(short && self.model.bridge(&mut memory.model, memory.missing)) {
-            self.model.forget(&mut memory.model);
+            self.model.pause(&mut memory.model);
             memory.missing = MAX_BRIDGED;
         }
     }

@@ -24,8 +24,7 @@ use crate::{
 ///    sign of the rate gives the branch.
 ///
 /// Every state begins settled at the first sample. Warm-up, missing samples and branch are handled as in every
-/// [`Front`]. A short gap is bridged with the last sample; after a longer gap the model forgets everything except
-/// branch and baseline.
+/// [`Front`]. A gap is bridged with the last sample; after a longer gap the rate estimator starts again.
 ///
 /// Cost: a product and a sum for each term, a product for each state.
 pub type HistoryReceptor<T, R = RateFilter<T>> = Front<History<T, R>>;
@@ -241,8 +240,11 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> Live for History<T, R> {
         begun
     }
 
-    fn forget(&self, memory: &mut Self::Memory) {
-        *memory = HistoryMemory { baseline: memory.baseline, ..self.memory() };
+    /// The memory relaxes towards the last sample, and the rate estimator starts again. The baseline does not change.
+    fn pause(&self, memory: &mut Self::Memory) {
+        let baseline = memory.baseline;
+        self.bridge(memory, 0);
+        (memory.baseline, memory.rate) = (baseline, self.rate.memory());
     }
 }
 

@@ -20,8 +20,7 @@ const LEAST_RUN: f64 = 0.01;
 /// corrects the states.
 ///
 /// There is an estimate from the first sample on, and the rate is a state, not a difference. A missing sample is
-/// bridged by prediction as in every [`Front`]; after a long gap the model forgets everything except branch and
-/// baseline.
+/// bridged by prediction as in every [`Front`]; during a longer gap the rate is zero.
 ///
 /// A sample corrects every state by a gain times the innovation (signal minus predicted signal). The gain is the
 /// stationary gain of a Kalman filter for the slope of the curve, from a table that is computed with the receptor. A
@@ -319,7 +318,8 @@ impl<T: Real> Live for Observer<T> {
         begun
     }
 
-    fn forget(&self, memory: &mut ObserverMemory<T>) {
-        *memory = ObserverMemory { baseline: memory.baseline, ..self.memory() };
+    fn pause(&self, memory: &mut ObserverMemory<T>) {
+        memory.states[1] = T::zero();
+        self.bridge(memory, 0);
     }
 }

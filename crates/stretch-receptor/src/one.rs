@@ -157,7 +157,7 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> Live for AnyModel<T, R> {
         with_its_own!(self, memory, |model, its| model.bridge(its, nth), false)
     }
 
-    fn forget(&self, memory: &mut Self::Memory) {
-        with_its_own!(self, &mut *memory, |model, its| model.forget(its), *memory = self.memory());
+    fn pause(&self, memory: &mut Self::Memory) {
+        with_its_own!(self, &mut *memory, |model, its| model.pause(its), *memory = self.memory());
     }
 }

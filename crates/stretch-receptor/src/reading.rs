@@ -85,8 +85,8 @@ impl fmt::Display for Domain {
 pub enum Withheld {
     /// The rate estimator has not seen enough samples yet, and the model needs a rate.
     Warming,
-    /// The sample was missing, not a number or too large. The receptor bridges a short gap; after a longer gap the
-    /// model starts again ([`MAX_BRIDGED`](crate::MAX_BRIDGED)).
+    /// The sample was missing, not a number or too large. The receptor bridges a short gap
+    /// ([`MAX_BRIDGED`](crate::MAX_BRIDGED)).
     Missing,
 }
 

@@ -223,7 +223,7 @@ fn lost_samples_are_predicted_over_and_wrong_models_refused() {
     for _ in 0..10 {
         let _ = receptor.step(&mut other, Volts(f64::NAN));
     }
-    // after a long gap the motion is forgotten, and the next sample counts alone
+    // in a long gap the variance grows, and the next sample counts almost alone
     assert!(receptor.step(&mut other, Volts(1.4)).unwrap().rate.abs() < 1e3);
     let refused = DiagnosedReceptor::<f32>::new(&example_observer()).unwrap_err();
     assert!(refused.to_string().contains("diagnosed"), "{refused}");

@@ -132,7 +132,7 @@ fn a_smooth_motion_differs_by_rounding() {
 }
 
 #[test]
-fn a_gap_is_bridged_and_a_long_one_forgets() {
+fn a_gap_keeps_the_memory() {
     let design = FixedObserver::new(&example_observer(), &adc()).unwrap();
     let mut receptor = Runner::new(design);
     let settled = (0..200).map(|_| receptor.step(AdcCode(1900)).unwrap()).last().unwrap();
@@ -142,14 +142,11 @@ fn a_gap_is_bridged_and_a_long_one_forgets() {
     }
     let after = receptor.step(AdcCode(1900)).unwrap();
     assert!((after.estimate - settled.estimate).abs() < 20, "{after:?} {settled:?}");
-    for _ in 0..10 {
+    for _ in 0..50 {
         let _ = receptor.step(AdcCode::MISSING);
     }
-    let mut fresh = Runner::new(design);
-    assert_eq!(
-        receptor.step(AdcCode(1500)).unwrap().estimate,
-        fresh.step(AdcCode(1500)).unwrap().estimate
-    );
+    let after = receptor.step(AdcCode(1900)).unwrap();
+    assert!((after.estimate - settled.estimate).abs() < 20, "{after:?} {settled:?}");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use stretch_core::{
 use stretch_receptor::{
     HistoryReceptor, ObserverReceptor, Receptor, ReceptorError, StretchReceptor, Withheld,
     code::{Adc, AdcSpec, FixedCalibration, FixedObserver},
-    example_calibration, strategies,
+    example_calibration, example_diagnosed, strategies,
 };
 
 const FIT: FitSummary = FitSummary { samples: 9000, r_squared: 0.99, rmse: 0.01 };
@@ -75,6 +75,35 @@ fn an_estimate_that_is_limited_has_its_own_word() {
     };
     assert_eq!(domain(0.5).as_deref(), Some("inside"));
     assert_eq!(domain(2.0).as_deref(), Some("estimate_clamped"));
+}
+
+proptest! {
+    /// The memory of the sensor survives a gap in which the target rests: the estimates afterwards are those of a
+    /// stream without the gap.
+    #[test]
+    fn a_gap_loses_no_memory(missing in 1_usize..300, moved in 20_usize..400) {
+        let mut coefficients = [0.0; TERMS];
+        (coefficients[0], coefficients[1], coefficients[2]) = (0.4, 0.4, 0.3);
+        for calibration in [observer(None, 0.3), history(None, &coefficients), example_diagnosed()] {
+            let mut whole = Runner::new(Receptor::<f64>::new(&calibration).unwrap());
+            let mut broken = whole.clone();
+            let volts = |n: usize| Volts(1.5 + 0.3 * (0.02 * n.min(moved) as f64).sin());
+            for n in 0..moved + 100 {
+                let _ = (whole.step(volts(n)), broken.step(volts(n)));
+            }
+            for _ in 0..missing {
+                let _ = (whole.step(volts(moved)), broken.step(Volts(f64::NAN)));
+            }
+            for _ in 0..20 {
+                let _ = (whole.step(volts(moved)), broken.step(volts(moved)));
+            }
+            let (known, found) = (whole.step(volts(moved)).unwrap(), broken.step(volts(moved)).unwrap());
+            prop_assert!(
+                (known.estimate - found.estimate).abs() < 0.1,
+                "{}: {known:?} {found:?}", calibration.spec().model.name()
+            );
+        }
+    }
 }
 
 fn rest() -> impl Strategy<Value = Option<RestTracker>> {

@@ -13,8 +13,18 @@ use crate::{
     prepare::{extent, rates_at_use, sample_rate_hz},
 };
 
-/// An interval between samples counts as jitter if it differs from the period by more than this share.
-const JITTER_TOLERANCE: f64 = 0.2;
+/// Checks the time stamps of a stream. An interval counts as jitter if it differs from the period by
+/// more than a fifth.
+///
+/// # Errors
+/// [`CalibrateError::Filter`] for a sample rate that is not possible.
+pub fn cadence(sample_rate: SampleRate) -> Result<Runner<Cadence>, CalibrateError> {
+    Ok(Runner::new(Cadence::new(sample_rate, 0.2)?))
+}
+
+/// Largest number of missing samples of one gap that are given to a receptor. Every memory has
+/// settled before.
+pub const MOST_MISSING: u32 = 20_000;
 
 /// A receptor that checks the time stamps. Missing samples are passed on as missing, and a time stamp that runs
 /// backwards resets the receptor.
@@ -74,10 +84,7 @@ impl LiveReceptor {
             missing: 0,
             memory: receptor.memory(),
             receptor,
-            cadence: Runner::new(Cadence::new(
-                calibration.spec().sample_rate_hz,
-                JITTER_TOLERANCE,
-            )?),
+            cadence: cadence(calibration.spec().sample_rate_hz)?,
             faults: Faults::default(),
         })
     }
@@ -90,7 +97,7 @@ impl LiveReceptor {
         match self.cadence.step(Seconds(time_s)) {
             Arrival::Gap { missing } => {
                 self.faults.missing += u64::from(missing);
-                for _ in 0..missing.min(u32::from(MAX_BRIDGED) + 1) {
+                for _ in 0..missing.min(MOST_MISSING) {
                     let _ = self.sample(f64::NAN);
                 }
             }

@@ -11,7 +11,10 @@ mod model_words;
 mod reach;
 
 pub use acceptance::{explains_little, explains_nothing};
-pub use apply::{Applied, Faults, LiveReceptor, apply, at_rate, on_own_ranges, pressure_column};
+pub use apply::{
+    Applied, Faults, LiveReceptor, MOST_MISSING, apply, at_rate, cadence, on_own_ranges,
+    pressure_column,
+};
 pub use doubt::{Doubt, Seen, evaluation_doubts};
 pub use evaluate::{
     Comparison, Estimates, Evaluation, MAX_LAG_S, MethodErrors, Methods, TrialErrors, evaluate,

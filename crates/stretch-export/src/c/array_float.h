@@ -359,7 +359,7 @@ static STRETCH_APART stretch_reading stretch_lost(stretch_state *s)
         if (s->of[k].loss != STRETCH_IN_USE) {
             continue;
         }
-        if (waiting || s->silent > STRETCH_MAX_BRIDGED) {
+        if (waiting) {
             stretch_forget(&s->of[k]);
         } else {
             stretch_pass(&s->of[k], s->of[k].last);

@@ -3,7 +3,7 @@
 #define STRETCH_WARMING 1 /* too few samples so far for the rate, which the model needs */
 #define STRETCH_MISSING 2 /* the sample is missing */
 
-/* Consecutive missing samples that are bridged; after one more, past samples are discarded. */
+/* Consecutive missing samples that are bridged. In a longer gap, the target is assumed to rest. */
 #define STRETCH_MAX_BRIDGED 3
 
 /* Code for every sample is inlined into the step; code that is seldom needed is kept out of it. */

@@ -37,7 +37,6 @@ typedef struct stretch_state {
 @end
     uint8_t begun;
     uint8_t branch;
-    uint8_t missing;
 } stretch_state;
 
 /* Resets all but branch, baseline, pressure and the distance that the gauge has travelled. */
@@ -65,7 +64,6 @@ static inline void stretch_init(stretch_state *s)
     s->excess = 0.0f;
 @end
     s->branch = STRETCH_TARGET_RISES;
-    s->missing = STRETCH_MAX_BRIDGED;
 }
 
 @if crosstalk
@@ -477,17 +475,13 @@ STRETCH_INLINE float stretch_above_rest(stretch_state *s, float signal)
 @end
 static STRETCH_APART void stretch_missed(stretch_state *s)
 {
-    if (s->missing < STRETCH_MAX_BRIDGED && s->begun) {
-        /* bridged by the predicted motion */
-        s->missing = (uint8_t)(s->missing + 1u);
-        stretch_predict(s);
-@if remembers
-        stretch_follow(s);
-@end
+    if (!s->begun) {
         return;
     }
-    stretch_forget(s);
-    s->missing = STRETCH_MAX_BRIDGED;
+    stretch_predict(s);
+@if remembers
+    stretch_follow(s);
+@end
 }
 
 /* Takes a missing sample. */
@@ -506,7 +500,6 @@ static STRETCH_APART stretch_reading stretch_step(stretch_state *s, float sample
     if (!stretch_usable(sample)) {
         return stretch_lost(s);
     }
-    s->missing = 0;
     signal = STRETCH_SIGN * sample;
 @if rest
     signal = stretch_above_rest(s, signal);

@@ -211,15 +211,18 @@ static STRETCH_APART void stretch_begin(stretch_state *s, float signal)
 
 static STRETCH_APART void stretch_missed(stretch_state *s)
 {
-    if (s->missing < STRETCH_MAX_BRIDGED && s->begun) {
-        /* bridged by the predicted motion */
-        s->missing = (uint8_t)(s->missing + 1u);
-        stretch_predict(s);
-        stretch_hold(s);
+    if (!s->begun) {
         return;
     }
-    stretch_forget(s);
-    s->missing = STRETCH_MAX_BRIDGED;
+    if (s->missing < STRETCH_MAX_BRIDGED) {
+        /* bridged by the predicted motion */
+        s->missing = (uint8_t)(s->missing + 1u);
+    } else {
+        /* in a longer gap, the target is assumed to rest */
+        s->rate = 0.0f;
+    }
+    stretch_predict(s);
+    stretch_hold(s);
 }
 
 /* Takes a missing sample. */

@@ -315,9 +315,9 @@ impl Live for IntegerObserver {
         begun
     }
 
-    fn forget(&self, memory: &mut IntegerMemory) {
-        let IntegerMemory { baseline, excess, .. } = *memory;
-        *memory = IntegerMemory { baseline, excess, ..self.memory() };
+    fn pause(&self, memory: &mut IntegerMemory) {
+        memory.rate = 0;
+        self.bridge(memory, 0);
     }
 }
 

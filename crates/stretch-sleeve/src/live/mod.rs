@@ -64,7 +64,7 @@ impl<T> ArrayReading<T> {
 pub enum ArrayWithheld {
     /// A channel in use has not had a sample yet.
     Warming,
-    /// No channel in use had a sample. A short gap is bridged. After a longer one the signals are forgotten.
+    /// No channel in use had a sample. A short gap is bridged.
     Missing,
     /// Every channel is lost.
     AllLost,

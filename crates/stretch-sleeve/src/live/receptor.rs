@@ -31,8 +31,8 @@ use super::{
 /// 3. The gains for the remaining channels are selected: for all, for all but one, or for the best single channel.
 ///
 /// A missing sample, or one outside the possible range, is replaced by the channel's last one. If the samples of all channels in use are missing, this is a
-/// fault of the recorder and no channel is lost: [`MAX_BRIDGED`] such samples are replaced, and one more clears the
-/// signals but not the list of lost channels. Cost: two products and two sums for each term of a channel in use.
+/// fault of the recorder and no channel is lost: [`MAX_BRIDGED`] such samples are bridged, and further ones have
+/// no reading. Cost: two products and two sums for each term of a channel in use.
 ///
 /// ```
 /// use stretch_core::{Runner, Stage};
@@ -196,7 +196,8 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         &self.0.shares[..self.0.relaxations.min(ARRAY_RELAXATIONS)]
     }
 
-    /// Bridges a sample that is missing in all channels, or clears the signals after too many of them.
+    /// Replaces the samples that are missing in all channels by the last ones. There is no reading after too many of
+    /// them.
     fn silence(&self, memory: &mut ArrayMemory<T, N>) -> Result<ArrayReading<T>, ArrayWithheld> {
         // Changes of the channels during this time are not jumps.
         memory.warmed = 0;
@@ -206,13 +207,16 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         if in_use().next().is_none() {
             return Err(ArrayWithheld::AllLost);
         }
-        if memory.silent > MAX_BRIDGED || in_use().any(|k| memory.of[k].last.is_nan()) {
+        if in_use().any(|k| memory.of[k].last.is_nan()) {
             in_use().for_each(|k| memory.of[k] = ChannelMemory::new());
             return Err(ArrayWithheld::Missing);
         }
         for k in in_use() {
             let own = &mut memory.of[k];
             own.pass(own.last, self.shares());
+        }
+        if memory.silent > MAX_BRIDGED {
+            return Err(ArrayWithheld::Missing);
         }
         self.reading(memory)
     }

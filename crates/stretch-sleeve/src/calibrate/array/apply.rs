@@ -2,21 +2,16 @@
 
 use stretch_calibrate::{
     CalibrateError, Evaluation,
-    toolkit::{Estimates, MAX_LAG_S, Methods, evaluate_methods},
+    toolkit::{Estimates, MAX_LAG_S, MOST_MISSING, Methods, cadence, evaluate_methods},
 };
-use stretch_core::{Design, Interval, Runner, Seconds, Stage, Values, sizes::MOST};
+use stretch_core::{Design, Interval, Seconds, Stage, Values, sizes::MOST};
 use stretch_data::Trial;
-use stretch_filter::{Arrival, Cadence};
-use stretch_receptor::MAX_BRIDGED;
+use stretch_filter::Arrival;
 
 use crate::{
     ArrayCalibration, ArrayLoss, ArrayReading, ArrayReceptor, ArrayWithheld, MAX_CHANNELS,
     ShiftWatch, Shifts,
 };
-
-/// An interval between samples that differs from the period by at most this share is jitter, not a
-/// gap.
-const JITTER_TOLERANCE: f64 = 0.2;
 
 /// Readings of a trial, and the channels that were lost.
 #[derive(Debug, Clone)]
@@ -44,8 +39,7 @@ pub fn apply_array(
     let columns = columns.collect::<Result<Vec<_>, _>>()?;
     let receptor = ArrayReceptor::<f64, MAX_CHANNELS>::new(calibration);
     let mut memory = receptor.memory();
-    let mut cadence =
-        Runner::new(Cadence::new(calibration.spec().sample_rate_hz, JITTER_TOLERANCE)?);
+    let mut cadence = cadence(calibration.spec().sample_rate_hz)?;
     let watch = ShiftWatch::<f64, MAX_CHANNELS>::new(calibration);
     let mut watched = watch.map(|watch| (watch, watch.memory()));
     let mut applied = AppliedArray { readings: Vec::new(), losses: Vec::new(), shifts: Vec::new() };
@@ -56,8 +50,7 @@ pub fn apply_array(
     };
     for (i, &time_s) in trial.time_s.iter().enumerate() {
         if let Arrival::Gap { missing } = cadence.step(Seconds(time_s)) {
-            // One missing sample more than is bridged clears the signals. Further ones change nothing.
-            for _ in 0..missing.min(u32::from(MAX_BRIDGED) + 1) {
+            for _ in 0..missing.min(MOST_MISSING) {
                 let _ = step(&mut memory, [f64::NAN; MAX_CHANNELS]);
             }
         }

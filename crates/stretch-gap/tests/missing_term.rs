@@ -52,7 +52,7 @@ fn no_time_constant_is_longer_than_the_recording() {
         panic!("{}", found.equation)
     };
     assert!(tau_s > 28.0 && tau_s <= 40.0, "{}", found.equation);
-    let words = "s is longer than the 28.0 s that were fitted of the longest recording, so the cause may also be a drift or an integral.";
+    let words = "s is longer than the 28 s that were fitted of the longest recording, so the cause may also be a drift or an integral.";
     assert!(found.sentence.contains(words), "{}", found.sentence);
 }
 

@@ -357,9 +357,9 @@ mod tests {
     #[test]
     fn words_have_units() {
         let swing = Course::Swings { hertz: 0.7, amplitude: 0.012 };
-        assert_eq!(swing.words("V"), "it oscillates at 0.700 Hz with an amplitude of 0.0120 V");
+        assert_eq!(swing.words("V"), "it oscillates at 0.7 Hz with an amplitude of 0.012 V");
         let jitter = Course::Jitters { sd_s: 0.0042 };
-        let told = "time stamps jitter by about 4.20 ms, which is noise that follows the rate";
+        let told = "time stamps jitter by about 4.2 ms, which is noise that follows the rate";
         assert_eq!(jitter.words("V"), told);
     }
 }

@@ -81,6 +81,9 @@ impl Gross {
 
 /// Marks an alternative that replaces the whole set and not one of its effects.
 const WHOLE: usize = usize::MAX;
+/// The share of the gap that an error may leave, divided by that of a set of effects, whose forms
+/// differ from those of the rig.
+const EXACT: f64 = 0.1;
 /// Difference of scores, in nats, within which two errors are tied.
 const TIE: f64 = 1.1;
 
@@ -95,7 +98,7 @@ pub(crate) fn allowed_gap(problem: &PreparedProblem<'_>, thresholds: &Thresholds
 ///
 /// The form of an error is exactly known and has one parameter, so the right error leaves almost
 /// only noise. An error wins if its score is higher than that of the best set of effects and if it
-/// leaves no larger gap than a named set may leave.
+/// leaves much less of the gap ([`EXACT`]) than a named set may leave.
 pub(crate) fn weigh_errors(
     doubted: &PreparedProblem<'_>,
     suspect: &Suspect<'_>,
@@ -103,7 +106,8 @@ pub(crate) fn weigh_errors(
     found: &Found,
     thresholds: &Thresholds,
 ) -> Option<(Vec<Gross>, Found)> {
-    let most = allowed_gap(doubted, thresholds);
+    let share = EXACT * thresholds.unknown_share;
+    let most = thresholds.unknown_excess + share * doubted.gap(&doubted.nominal);
     let least = found.best.score.max(thresholds.rise);
     let above = |e: &Hypothesis| e.score > least && doubted.gap(e) <= most;
     let mut errors = errors.into_iter().filter(above);

@@ -48,23 +48,23 @@ fn an_equation_tells_each_of_its_letters_once() {
     let (sum, letters) = told.split_once("; ").expect("letters are told");
     assert_eq!(
         sum,
-        "volts += 0.0123 V max(0, x[rod_mm]) |v[rod_mm]| + -1.50 V lag(max(0, x[rod_mm]), 2.00 s)"
+        "volts += 0.0123 V max(0, x[rod_mm]) |v[rod_mm]| + -1.5 V lag(max(0, x[rod_mm]), 2 s)"
     );
     assert_eq!(
         letters,
-        "x[rod_mm] = (rod_mm - 40.0 mm)/(25.0 mm), v[rod_mm] = (d rod_mm/dt)/(25.0 mm/s)"
+        "x[rod_mm] = (rod_mm - 40 mm)/(25 mm), v[rod_mm] = (d rod_mm/dt)/(25 mm/s)"
     );
     // A command is not scaled.
     let command = [term(&[Factor::Power { signal: 1, power: 2.0 }], Passage::Direct, 2.0)];
     assert_eq!(
         equation("volts", &command, &signals(), TIMES_S),
-        "volts += 2.00 V max(0, x[valve])^2; x[valve] = valve"
+        "volts += 2 V max(0, x[valve])^2; x[valve] = valve"
     );
     // A term of time names its scale. An empty sum has no letters to define.
     let clock = [term(&[Factor::Time { power: 0.5 }], Passage::Direct, 2e-9)];
     assert_eq!(
         equation("volts", &clock, &signals(), TIMES_S),
-        "volts += 2.00e-9 V (time in trial/T_trial)^0.5; T_trial = 10.0 s"
+        "volts += 2e-9 V (time in trial/T_trial)^0.5; T_trial = 10 s"
     );
     assert_eq!(equation("volts", &[], &signals(), TIMES_S), "");
 }
@@ -75,7 +75,7 @@ fn a_sentence_says_which_of_three_it_is() {
     let found = sentence(&proposed(vec![term(&[x], Passage::Direct, 0.5)], false), "V");
     assert_eq!(
         found,
-        "What is missing in gauge may be volts += 0.500 V max(0, x[rod_mm])^2: it closes 83 % of what is left there on trials that were not fitted."
+        "What is missing in gauge may be volts += 0.5 V max(0, x[rod_mm])^2: it closes 83 % of what is left there on trials that were not fitted."
     );
     let dense = sentence(&proposed(Vec::new(), false), "V");
     assert!(dense.contains("depends on the recorded signals, but no short sum"), "{dense}");

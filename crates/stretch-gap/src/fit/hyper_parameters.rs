@@ -38,7 +38,9 @@ const SPREAD: (f64, f64) = (0.7, 1.1);
 impl Metric {
     /// Returns the metric whose nuisances have the most likely sizes and correlation times for a
     /// residual in multiples of the noise, and the rise of the log-likelihood compared with this
-    /// metric, nats. If the residual depends on the motion, the recorder is assumed not to drift.
+    /// metric, nats. If the residual depends on the motion, a missing effect is the likelier cause.
+    /// The recorder is then assumed not to drift, and a parameter to drift as the simulator
+    /// describes it.
     pub(crate) fn adapted(
         &self,
         roles: &SampleRoles,
@@ -61,14 +63,15 @@ impl Metric {
             let before = fits.last().copied().unwrap_or(0.0);
             let all = fits.iter().copied().zip(&levels);
             let Some((most, level)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
-            let drifts = best.loose()[which].parameter.is_none() && *level != Level::NONE;
+            let is_recorder = best.loose()[which].parameter.is_none();
+            let usual = if is_recorder { Level::NONE } else { own };
             let is_of_motion = || {
                 let mut left = residual.to_vec();
                 one(Level::NONE).clean(roles, &mut left);
                 depends_on_motion(&left)
             };
-            if BEYOND.contains(&level.size) || (drifts && is_of_motion()) {
-                best = one(Level::NONE);
+            if BEYOND.contains(&level.size) || (*level != usual && is_of_motion()) {
+                best = one(usual);
             } else {
                 gained += most - before;
                 best = one(*level);

@@ -3,10 +3,12 @@
 //! 1. The effect closes at least the share `share` of the gap that is left in its stages.
 //! 2. The score, and the likelihood by [octaves](crate::fit::octaves) of frequency, both rise by
 //!    `rise` nats.
-//! 3. The effects of the smaller set may leave up to the share `model_discrepancy` of what they
+//! 3. An effect that closes less than `null_excess` is added only if the score rises by
+//!    `faint_rise`.
+//! 4. The effects of the smaller set may leave up to the share `model_discrepancy` of what they
 //!    close, because their forms differ from those of the rig. An effect that closes no more than
-//!    that, or less than `null_excess`, is added only if the score rises by `faint_rise`. If it
-//!    closes no more than that, it must also close most of what is left.
+//!    that must close most of what is left, and the likelihood by octaves must rise by `faint_rise`,
+//!    because a discrepancy is slow and raises it little.
 //!
 //! The criteria must also hold if [deviations](crate::fit::deviations) from the usual forms of the
 //! effects are added to both sets. What a deviation explains is not evidence for a further effect.
@@ -55,12 +57,13 @@ impl Acceptance<'_> {
         let all = 0..base.misfits.len();
         let closed: f64 = all.map(|stage| self.problem.closes(base, next, stage)).sum();
         let is_beyond = self.exceeds_discrepancy(base, next, new);
-        let (least, of_left) = match is_beyond {
-            true => (self.least_rise(closed), share),
+        let is_faint = closed < self.thresholds.null_excess;
+        let (least_octaves, of_left) = match is_beyond || is_faint {
+            true => (rise, if is_beyond { share } else { MOST }),
             false => (self.thresholds.faint_rise, MOST),
         };
-        next.score - base.score > least
-            && self.problem.rise(base, next) > rise
+        next.score - base.score > self.least_rise(closed)
+            && self.problem.rise(base, next) > least_octaves
             && closed >= of_left * self.left(base, new)
     }
 

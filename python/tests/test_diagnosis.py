@@ -533,7 +533,7 @@ def test_a_proposed_experiment_begins_where_the_recording_does_and_is_no_faster(
 def test_progress_is_told_and_may_stop_it():
     words = []
     diagnose(Spring(), BENT, progress=words.append)
-    assert any(word.startswith("test trials") for word in words)
+    assert any(word.startswith("simulating the test trials") for word in words)
 
     def enough(_):
         raise TimeoutError("enough")

@@ -254,7 +254,7 @@ fn search<'a>(
         let from = other.nominal.clone();
         return self::search(task, other, &from);
     }
-    progress("nuisances");
+    progress("estimating slow drifts and offsets");
     let other = re_estimated(&problem, &mut search.sets, &best, options.seed);
     let other = if_possible(other)?.flatten();
     let rivalled = |mut search: Search<'_>, best: Hypothesis| {
@@ -298,7 +298,7 @@ fn doubt(
     (doubted, suspect): (&PreparedProblem<'_>, &Suspect<'_>),
 ) -> Result<Option<(Vec<Gross>, Found)>, GapError> {
     let (thresholds, found) = (&task.options.thresholds, &searched.found);
-    (task.progress)("errors of the recording");
+    (task.progress)("testing for errors of the recording");
     if searched.problem.is_spent() {
         return Ok(None);
     }
@@ -319,7 +319,7 @@ fn limits(
     if !task.examines_effects || problem.is_spent() {
         return Ok(Vec::new());
     }
-    (task.progress)("detection limits");
+    (task.progress)("estimating detection limits");
     let (best, thresholds) = (&searched.found.best, &task.options.thresholds);
     let inputs = LimitInputs { problem, best, thresholds, null_band, seed: task.options.seed };
     Ok(if_possible(detection_limits(inputs, searched.looked.as_deref()))?.unwrap_or_default())
@@ -357,7 +357,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
     let Cause { found, eliminated, .. } = cause;
     let problem = &cause.problem.clone().with_reserve(true);
     let (seed, thresholds) = (task.options.seed, &task.options.thresholds);
-    (task.progress)("test trials");
+    (task.progress)("simulating the test trials");
     let mut evidence = Evidence::gather(problem, found)?;
     let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
     let (all, held) = candidates(problem, &evidence, all, seed)?;
@@ -368,7 +368,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
         if too_little.is_some() {
             return Ok(None);
         }
-        (task.progress)("what the catalogue lacks");
+        (task.progress)("searching for an equation outside the catalogue");
         proposal = if_possible(propose(problem, &problem.nominal))?.flatten();
         let Some(proposal) = &proposal else { return Ok(None) };
         Ok(if_possible(weigh_term_sum(problem, evidence, (proposal, best), thresholds))?.flatten())
@@ -380,7 +380,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
         stabilities(problem, thresholds, &evidence, (&posterior, &blocks), (null_band, seed));
     let shares = shares(problem, &evidence, &found.best, eliminated)?;
     let sanity = Sanity::of(problem, &found.best, &evidence)?;
-    (task.progress)("where the gap sits");
+    (task.progress)("measuring the gap by stage and range");
     let location = Where {
         stages: stage_gaps(problem, &evidence),
         slices: localise::slices(problem.simulator(), &evidence, |s| &s.residual_retuned, seed),

@@ -192,15 +192,18 @@ fn progress_is_told_in_the_order_of_the_flow() {
     };
     let order = [
         "re-tuning",
-        "screening",
-        "fitting",
-        "nuisances",
-        "rivals",
+        "trying effects, round 1: ",
+        "fitting effects, round 1: ",
+        "estimating slow drifts",
+        "comparing effects with alternatives: 1",
         "errors of the recording",
         "test trials",
     ]
     .map(at);
     assert!(order.is_sorted(), "{order:?} {heard:?}");
+    let internal = ["nuisance", "rival", "pruning", "second line", "screen", "candidate"];
+    let is_internal = |said: &&String| internal.iter().any(|word| said.contains(word));
+    assert_eq!(heard.iter().find(is_internal), None);
 }
 
 fn budgeted(budget: Option<usize>) -> (Diagnosis, usize) {

@@ -85,7 +85,7 @@ impl Problem {
         };
         let (mut diagnosis, evidence) = diagnose(self.simulator(), options, &report, stop)?;
         if !diagnosis.named.is_empty() {
-            report("what the gap costs a calibration");
+            report("computing the calibration error that the gap causes");
             let simulations = AtomicUsize::new(0);
             let asked = (options.seed, &simulations);
             // if a run fails or the run budget is spent, the diagnosis is reported without the
@@ -98,7 +98,7 @@ impl Problem {
         }
         let mut proposal = None;
         if diagnosis.ambiguous.len() > 1 && looks_on {
-            report("the next experiment");
+            report("looking for the next experiment");
             proposal = source.next(&diagnosis, &evidence)?;
         }
         diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());

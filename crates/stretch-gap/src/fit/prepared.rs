@@ -101,7 +101,7 @@ impl<'a> PreparedProblem<'a> {
         let simulator = runs.simulator();
         let roles = SampleRoles::of(simulator)?;
         let shipped = Model::nominal(simulator);
-        progress("noise");
+        progress("estimating the noise");
         let rough = Comparison::around(runs.clone(), roles.clone(), &shipped, None, seed)?;
         progress("re-tuning the nominal parameters");
         let (first, ..) = possible_retuning(&rough, &shipped, &shipped)?;

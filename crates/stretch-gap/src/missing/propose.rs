@@ -281,7 +281,7 @@ pub(crate) fn propose_for(
     let found = match known.filter(|_| !names) {
         Some(known) => Some(known.clone()),
         None => {
-            progress("what the catalogue lacks");
+            progress("searching for an equation outside the catalogue");
             let from = if names { best } else { &problem.nominal };
             propose(problem, from)?.map(|proposal| proposal.told)
         }

@@ -50,7 +50,7 @@ pub(crate) fn likelier<'a>(
     if gap < thresholds.null_excess {
         return Ok((at_rows, unaltered));
     }
-    progress("when commands switch");
+    progress("testing when commands switch");
     let between = PreparedProblem::prepare(between_rows, at_rows.stop(), seed, progress)?;
     let between = between.retuned_from_starts(thresholds.least_gap, seed)?;
     if between.log_likelihood(&between.nominal) <= at_rows.log_likelihood(&at_rows.nominal) {

@@ -135,7 +135,9 @@ impl<'a> Search<'a> {
     ) -> Result<Found, GapError> {
         let mut exchanges = 0;
         loop {
-            progress("rivals");
+            if !best.effects.is_empty() {
+                progress(&format!("comparing effects with alternatives: {}", best.effects.len()));
+            }
             let rivals = self.rivals(&best)?;
             let first = rivals.iter().map(|(_, r)| r).max_by(|a, b| a.score.total_cmp(&b.score));
             let better = first.filter(|r| r.score > best.score).cloned();
@@ -230,7 +232,7 @@ impl<'a> Search<'a> {
         let Some(runner_up) = runner_up.filter(|r| r.score > RIVALRY * best.score) else {
             return Ok(best);
         };
-        progress("a second line");
+        progress("starting again from another first effect");
         let other = self.grow(runner_up, progress)?;
         Ok(if other.score > best.score { other } else { best })
     }
@@ -256,7 +258,7 @@ impl<'a> Search<'a> {
             best = next;
         }
         if best.effects.len() > 1 {
-            progress("removing weak effects");
+            progress(&format!("testing whether effects are needed: {}", best.effects.len()));
             best = if_possible(self.prune(best.clone()))?.unwrap_or(best);
         }
         Ok(best)
@@ -269,14 +271,15 @@ impl<'a> Search<'a> {
         progress: &dyn Fn(&str),
     ) -> Result<Option<Hypothesis>, GapError> {
         let round = best.effects.len() + 1;
-        progress(&format!("screening effects, round {round}"));
+        let untried = self.problem.simulator().effects().len() - best.effects.len();
+        progress(&format!("trying effects, round {round}: {untried}"));
         let looked = self.look(best)?;
         let Looked { ground, screened } = &*looked;
         let kept = if best.effects.is_empty() { KEPT } else { KEPT_LATER };
         let deviating = self.acceptance.deviating(best)?;
         let base = (best, &deviating);
         let list = self.shortlist(base, screened, kept);
-        progress(&format!("fitting {} candidates, round {round}", list.len()));
+        progress(&format!("fitting effects, round {round}: {}", list.len()));
         let next = self.first_accepted(base, ground, &list)?;
         let is_open = self.problem.gap(best) > self.acceptance.thresholds.null_excess;
         if next.is_some() || !is_open || !self.is_thorough || self.problem.is_spent() {
@@ -284,8 +287,8 @@ impl<'a> Search<'a> {
         }
         // A screen assumes linear changes. Before a gap is left unexplained, every effect that
         // could cause it is therefore fitted, whatever its gain in the screen.
-        progress(&format!("fitting the other candidates, round {round}"));
         let others = self.others(&deviating, screened, &list);
+        progress(&format!("fitting effects that seemed weaker, round {round}: {}", others.len()));
         let least = |effect| self.least_gain(best, effect);
         let others = self.sets.promising(best, ground, others, least)?;
         self.first_accepted(base, ground, &others)

@@ -146,13 +146,13 @@ fn compared(
     let mut start = found.unwrap_or(&evidence.retuned).clone();
     start.effects.retain(|(e, _)| diagnosis.named.contains(&simulator.effects()[*e].name));
     let noise: Vec<f64> = evidence.stages.iter().map(|s| s.noise).collect();
-    progress("all runs together");
+    progress("fitting all runs together");
     let samples: usize = simulator.trials().iter().map(|t| t.samples).sum();
     let whole: Vec<usize> = (0..samples).collect();
     let all = fit_samples(simulator, &noise, &whole, &start, stop)?;
     let mut runs = Vec::new();
     for (i, group) in groups.iter().enumerate() {
-        progress(&format!("run {} of {}", i + 1, groups.len()));
+        progress(&format!("fitting run {} of {}", i + 1, groups.len()));
         let fit = fit_samples(simulator, &noise, &group.samples, &all.model, stop)?;
         runs.push((group.name.clone(), fit));
     }

@@ -89,7 +89,7 @@ fn methods(page: &mut Page, score: &Score) {
     page.figures(&[
         (
             narrow_bar_figure("First name right, by method", &right, Scale::Percent, "%"),
-            "First name right for one missing effect at an excess of 0.1 or more.".to_owned(),
+            "Share of the simulators with one missing effect in which the effect named first is the missing one. Counted are gaps with an excess of 0.1 or more.".to_owned(),
         ),
         (
             narrow_bar_figure("Nulls on which an effect is named", &wrong, Scale::Percent, "%"),
@@ -142,7 +142,7 @@ fn strength(page: &mut Page, score: &Score, answers: &Answers) {
         .collect();
     page.figure(
         &bar_figure("First name right, by strength", &rows, Scale::Percent, "%"),
-        "First name right for one missing effect, by the excess that it causes, with Wilson's 95 % interval.",
+        "Share of the simulators with one missing effect in which the effect named first is the missing one, by the excess that the effect causes, with Wilson's 95 % interval.",
     );
     let by_effect = score.by_effect.iter().map(|(name, rate)| rate_row(name, rate, Ink::Third));
     let by_effect: Vec<Row> = by_effect.collect();

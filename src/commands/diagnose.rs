@@ -25,7 +25,7 @@ use super::{
 use crate::display::{fail, is_quiet, is_verbose, warn};
 
 /// End of the message if there are competing explanations but no recommended experiment.
-const NOT_FORETOLD: &str = " that the simulator can predict: it accepts no altered inputs, or its budget of runs is used up";
+const NO_PREDICTION: &str = " that the simulator can predict: it accepts no altered inputs, or its budget of runs is used up";
 /// Exit status if the verdict is listed in `--fail-on`.
 const FAILED_ON: u8 = 3;
 /// Exit status of a diagnosis with fewer simulator runs than requested, because the budget was
@@ -272,7 +272,7 @@ fn conclude(
         (Some(path), None) => missing.push(format!(
             "{} is not written: no experiment is recommended, because there are no competing effects to distinguish{}",
             path.display(),
-            if examined.diagnosis.ambiguous.len() > 1 { NOT_FORETOLD } else { "" }
+            if examined.diagnosis.ambiguous.len() > 1 { NO_PREDICTION } else { "" }
         )),
         _ => {}
     }

@@ -396,7 +396,8 @@ pub const BLIND_BAND_OFF: f64 = 1e-8;
 /// with those of the proposed term. Shape parameters are refined in steps of 5 %, and an error of a
 /// width changes the coefficient by the same share.
 pub const PLANTED_TERM: f64 = 0.08;
-/// Relative: a coefficient that is fitted in other units. Every sample is rounded because the
+/// Relative difference between a coefficient that is fitted to columns in one unit and the same
+/// coefficient from columns in another unit, converted back. Every sample is rounded because the
 /// factors are not powers of two, and a search with numerical derivatives stops at its step size.
 pub const RESCALED: f64 = 1e-4;
 

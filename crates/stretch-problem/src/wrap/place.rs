@@ -251,14 +251,14 @@ fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<S
         Beside::Nothing | Beside::Itself => return None,
         Beside::Another => {
             format!(
-                "{} is not looked for at {}: name another column with beside",
+                "{} is not looked for at {}: list another column in the setting beside",
                 kind.name, site.column
             )
         }
         Beside::VelocityAndLoad | Beside::PositionAndLoad => {
             rubs.filter(|_| site.is_force())?;
             format!(
-                "friction that grows with a load is not looked for at {}: name the column of the load with beside",
+                "friction that grows with a load is not looked for at {}: list the column of the load in the setting beside",
                 site.column
             )
         }

@@ -84,15 +84,19 @@ def test_text_in_any_dialect_is_a_dict_of_columns(tmp_path):
 
 
 def test_a_spreadsheet_is_refused_as_one(tmp_path):
-    for name, member in (("real.xlsx", "xl/workbook.xml"), ("real.ods", "content.xml")):
+    for name, member in (("real.xlsx", "xl/workbook.xml"), ("real.ods", "content.xml"), ("real.zip", "run.csv")):
         with zipfile.ZipFile(tmp_path / name, "w") as archive:
             archive.writestr(member, "<x/>")
+    (tmp_path / "cut.real.xlsx").write_bytes((tmp_path / "real.xlsx").read_bytes()[:60])
     (tmp_path / "real.xls").write_bytes(bytes.fromhex("d0cf11e0a1b11ae1") + bytes(600))
     for path in sorted(tmp_path.iterdir()):
-        with pytest.raises(
-            stretch_gap.StretchError, match=r"real\.\w+: this spreadsheet cannot be read: .*; save the table as CSV"
-        ):
+        what = {"ods": "OpenDocument", "zip": "ZIP"}.get(path.suffix[1:], "Excel")
+        todo = "unpack it" if what == "ZIP" else "save the sheet as CSV"
+        words = rf"real\.\w+: this {what} file cannot be read: .*; {todo}"
+        with pytest.raises(stretch_gap.StretchError, match=words):
             stretch_gap.read(path)
+        with pytest.raises(stretch_gap.StretchError, match=words):
+            stretch_gap.convert(path, tmp_path.parent / "out.npz")
 
 
 def test_arrays_of_numpy_have_their_clocks(tmp_path):

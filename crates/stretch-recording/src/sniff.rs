@@ -46,7 +46,7 @@ const FOREIGN: [(&[u8], &str, &str); 5] = [
     (b"\xfd7zXZ\0", "xz", "unpack it with unxz, or pack it with gzip"),
     (b"\xd0\xcf\x11\xe0", "Excel", EXCEL),
 ];
-/// What to do with an old or new Excel workbook.
+/// What to do with a spreadsheet.
 pub(crate) const EXCEL: &str = "save the sheet as CSV";
 
 impl Format {

@@ -36,7 +36,6 @@ READERS: tuple[tuple[int, bytes, Callable[[Path, Arrays], None]], ...] = (
     (0, b"PAR1", tables.read_parquet),
     (0, b"\x93NUMPY", tables.read_numpy),
     (0, b"PK\x03\x04", tables.read_numpy),
-    (0, b"\xd0\xcf\x11\xe0", tables.read_spreadsheet),
 )
 """Offset and bytes by which a format is recognised, and the reader of the format."""
 
@@ -187,7 +186,7 @@ def read(
 def contents(path: str | os.PathLike[str]) -> Arrays | None:
     """Return the named arrays of a file.
 
-    Return None if the format is not in `READERS`, because the file is then read as text.
+    Return None if the format is not in `READERS`, because the program then reads the file.
     """
     file = Path(path)
     found = Arrays(os.fspath(path))
@@ -207,6 +206,8 @@ def _reader(file: Path) -> Callable[[Path, Arrays], None] | None:
             head = stream.read(520)
     except OSError as error:
         raise StretchError(f"{file}: cannot open it: {error.strerror}") from None
+    if head.startswith(b"PK") and not tables.has_arrays(file):
+        return None  # the reader of the program says what the archive contains
     return next((reader for at, magic, reader in READERS if head.startswith(magic, at)), None)
 
 

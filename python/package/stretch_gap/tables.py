@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,15 @@ def file_of(path: Path) -> Path:
     return path if path.exists() else Path(re.sub(r"#\d+$", "", str(path)))
 
 
+def has_arrays(path: Path) -> bool:
+    """Return whether a ZIP archive is complete and contains arrays of NumPy."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return any(name.endswith(".npy") for name in archive.namelist())
+    except (OSError, zipfile.BadZipFile):
+        return False
+
+
 def read_numpy(path: Path, found: Arrays) -> None:
     """Read an NPY or NPZ file. Arrays of objects are left out."""
     try:
@@ -28,8 +38,6 @@ def read_numpy(path: Path, found: Arrays) -> None:
             found.take("" if held.dtype.names else "column_0", held)
             return
         names = held.files
-        if any(name.startswith("xl/") or name == "content.xml" for name in names):
-            read_spreadsheet(path, found)
     except (OSError, ValueError, EOFError) as error:
         raise found.cannot("NumPy file", error, "save it again with numpy.savez") from error
     with held:
@@ -38,11 +46,6 @@ def read_numpy(path: Path, found: Arrays) -> None:
                 found.take(name, held[name])
             except ValueError as error:
                 found.leave(name, str(error))
-
-
-def read_spreadsheet(path: Path, found: Arrays) -> None:
-    """Refuse a file of Excel or LibreOffice."""
-    raise found.cannot("spreadsheet", "its format is that of Excel or LibreOffice", "save the table as CSV, and read that file")
 
 
 def read_parquet(path: Path, found: Arrays) -> None:

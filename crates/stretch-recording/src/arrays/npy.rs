@@ -56,15 +56,16 @@ pub(crate) fn read_archive(
     let broken = |e: zip::result::ZipError| {
         fail(format!("the archive is broken: {e}; save it again with numpy.savez"))
     };
+    // The names of the members are not compressed, so they can also be read in a broken archive.
+    if let Some((format, todo)) = foreign(&bytes) {
+        let problem = format!("this format is not supported; {todo}");
+        return Err(RecordingError::Format { file: file.to_owned(), format, problem });
+    }
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;
     let (mut arrays, mut other) = (Vec::new(), Vec::new());
     for i in 0..archive.len() {
         let mut member = archive.by_index(i).map_err(broken)?;
         let path = member.name().map_err(broken)?.into_owned();
-        if path.starts_with("xl/") {
-            let problem = format!("this format is not supported; {EXCEL}");
-            return Err(RecordingError::Format { file: file.to_owned(), format: "Excel", problem });
-        }
         let Some(name) = path.strip_suffix(".npy") else { continue };
         let read = room.unpack(&mut member);
         let read =
@@ -79,21 +80,27 @@ pub(crate) fn read_archive(
         }
     }
     if arrays.is_empty() {
-        return Err(fail(match &other[..] {
-            [] => {
-                "it contains no array; give the recording itself, or save arrays with numpy.savez"
-                    .to_owned()
-            }
-            _ => {
-                format!("none of its arrays contains numbers that can be read: {}", listed(&other))
-            }
-        }));
+        let other = listed(&other);
+        return Err(fail(format!("none of its arrays contains numbers that can be read: {other}")));
     }
     drop(archive);
     let mut notes = Vec::new();
     note(&mut notes, "left out", &other);
     beside(&arrays, &mut room).map_err(fail)?;
     tracks(file, arrays, notes, options)
+}
+
+/// Returns the format of a ZIP archive without NumPy's arrays, and what to do; `None` if it contains arrays.
+fn foreign(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+    let holds = |name: &[u8]| bytes.windows(name.len()).any(|part| part == name);
+    match holds {
+        _ if holds(b".npy") => None,
+        _ if holds(b"[Content_Types].xml") || holds(b"xl/work") => Some(("Excel", EXCEL)),
+        _ if holds(b"opendocument.spreadsheet") || holds(b"content.xml") => {
+            Some(("OpenDocument", EXCEL))
+        }
+        _ => Some(("ZIP", "unpack it, and give the recording itself")),
+    }
 }
 
 /// Splits a matrix into columns with the given names.

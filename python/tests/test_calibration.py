@@ -112,7 +112,14 @@ def test_a_sample_without_a_number_is_left_out_as_in_a_file(fitted, tmp_path, sp
     read = stretch_gap.read(path)
     assert read["signal"].size == 1999
     same = stretch_gap.calibrate(read["signal"], read["angle"], time_s=read.time_s, model="linear")
-    assert json.loads(one.to_json())["model"] == json.loads(same.to_json())["model"]
+    model = json.loads(one.to_json())["model"]
+    assert json.loads(same.to_json())["model"] == model
+    stamps = np.where(np.arange(signal.size) == 700, spoilt, time_s)
+    with pytest.warns(stretch_gap.DoubtWarning, match=r"1 of 2000 .* lost \(700\): sample 700 of time_s is"):
+        same = stretch_gap.calibrate(signal, angle, time_s=stamps, model="linear")
+    assert json.loads(same.to_json())["model"] == model
+    with pytest.raises(stretch_gap.StretchError, match=r"time_s, sample 700: .* is not a time; leave this sample out"):
+        same.apply(signal, time_s=stamps)
 
 
 def test_a_missing_sample_has_no_estimate_and_the_others_keep_theirs(tested, poly13):

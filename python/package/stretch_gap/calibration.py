@@ -310,6 +310,9 @@ class Calibration:
         if rate_hz is None and time_s is None:
             rate_hz = self.rate_hz
         stamps = times(values.size, rate_hz, time_s, "the recording")
+        wrong = np.flatnonzero(~np.isfinite(stamps))
+        if wrong.size:
+            raise _stretch.StretchError(f"time_s, sample {wrong[0]}: {stamps[wrong[0]]} is not a time; leave this sample out")
         pressures = None
         if self._record.needs_pressure:
             if pressure is None:

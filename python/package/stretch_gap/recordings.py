@@ -91,16 +91,17 @@ SLOW_HZ, LONG = 5.0, 1000
 
 
 def without_missing(what: str, time_s: Array, channels: Sequence[tuple[str, Array]]) -> tuple[Array, list[tuple[str, Array]]]:
-    """Return the samples in which every channel has a number, as the reader of files does.
+    """Return the samples in which the time and every channel have a number, as the reader of files does.
 
     The others count as lost samples, which the resampling bridges or treats as a gap. A `DoubtWarning` lists them.
     """
-    present = np.logical_and.reduce([np.isfinite(values) for _, values in channels], initial=np.True_)
+    columns = [("time_s", time_s), *channels]
+    present = np.logical_and.reduce([np.isfinite(values) for _, values in columns])
     left_out = np.flatnonzero(~present)
     if not left_out.size:
         return time_s, list(channels)
     first = int(left_out[0])
-    name, value = next((name, values[first]) for name, values in channels if not np.isfinite(values[first]))
+    name, value = next((name, values[first]) for name, values in columns if not np.isfinite(values[first]))
     if left_out.size == time_s.size:
         raise StretchError(f"{what}: no sample has a number in every column; {name} is {value} in sample {first}")
     some = ", ".join(map(str, left_out[:5])) + (", ..." if left_out.size > 5 else "")
@@ -110,7 +111,10 @@ def without_missing(what: str, time_s: Array, channels: Sequence[tuple[str, Arra
 
 
 def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: str) -> Array:
-    """Return checked time stamps in seconds, computed from the sample rate or taken from `time_s`."""
+    """Return time stamps in seconds, computed from the sample rate or taken from `time_s`.
+
+    The finite time stamps must increase. Others are returned as they are.
+    """
     if (rate_hz is None) == (time_s is None):
         raise StretchError(f"{what}: give either rate_hz, the sample rate, or time_s, the time stamps")
     if rate_hz is not None:
@@ -122,20 +126,19 @@ def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: s
     given = np.asarray(time_s)
     if given.dtype.kind in "mM" and given.size:
         # The difference must be taken before the conversion to numbers, because the unit is lost there.
-        time_s = (given - given.flat[0]) / np.timedelta64(1, "s")
+        time_s = (given - given.flat[np.argmin(np.isnat(given))]) / np.timedelta64(1, "s")
     stamps = column(time_s, f"time_s of {what}")
     same_length(stamps, samples, f"time_s of {what}", "columns")
-    wrong = np.flatnonzero(~np.isfinite(stamps))
-    if wrong.size:
-        raise StretchError(f"time_s of {what}, sample {wrong[0]}: {stamps[wrong[0]]} is not a time; leave this sample out")
-    back = np.flatnonzero(np.diff(stamps) <= 0.0)
+    known = np.flatnonzero(np.isfinite(stamps))
+    steps = np.diff(stamps[known])
+    back = np.flatnonzero(steps <= 0.0)
     if back.size:
-        i = int(back[0]) + 1
+        before, i = known[back[0] : back[0] + 2]
         raise StretchError(
-            f"time_s of {what}, sample {i}: {stamps[i]} s does not come after {stamps[i - 1]} s; sort the samples, or give "
+            f"time_s of {what}, sample {i}: {stamps[i]} s does not come after {stamps[before]} s; sort the samples, or give "
             "several recordings as a list"
         )
-    step_s = float(np.median(np.diff(stamps))) if samples > 1 and given.dtype.kind not in "mM" else 0.0
+    step_s = float(np.median(steps)) if steps.size and given.dtype.kind not in "mM" else 0.0
     if step_s > SLOW_S or (samples > LONG and step_s > 1.0 / SLOW_HZ):
         words = f"time_s of {what}: the median step is {step_s:.4g} s ({1.0 / step_s:.4g} samples per second)"
         doubt([("slow_clock", f"{words}; if the time stamps are in milliseconds, divide them by 1000")])

@@ -226,13 +226,13 @@ pub fn shown(content: &[u8]) -> String {
 }
 
 /// Returns the candidate nearest to `name` by edit distance, ignoring case, if it is near enough to
-/// be meant: at most two edits and fewer than half the length of `name`. A candidate that equals
-/// `name` plus a unit (`_mm`) counts as zero edits.
+/// be meant: at most two edits and fewer than half the length of `name`. Names are also compared
+/// without the unit of the candidate (`_mm`).
 ///
 /// ```
 /// let names = ["time_s", "length_mm", "bridge_v"];
 /// assert_eq!(stretch_data::nearest("lenght_mm", names), Some("length_mm"));
-/// assert_eq!(stretch_data::nearest("length", names), Some("length_mm"));
+/// assert_eq!(stretch_data::nearest("lenght", names), Some("length_mm"));
 /// assert_eq!(stretch_data::nearest("pressure_kpa", names), None);
 /// ```
 pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
@@ -240,9 +240,9 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     // product of the lengths.
     let short = |text: &str| text.to_lowercase().chars().take(64).collect::<String>();
     let name = short(name);
-    let edits = |one: &str| match one.strip_prefix(&name) {
-        Some(unit) if unit.starts_with('_') && !name.is_empty() => 0,
-        _ => strsim::levenshtein(&name, one),
+    let edits = |one: &str| {
+        let units = one.match_indices('_').map(|(i, _)| &one[..i]);
+        units.chain([one]).map(|stem| strsim::levenshtein(&name, stem)).min().unwrap_or_default()
     };
     let near = candidates.into_iter().map(|one| (edits(&short(one)), one));
     near.filter(|(edits, _)| *edits <= 2 && 2 * edits < name.chars().count().max(1))

@@ -7,7 +7,7 @@ use stretch_data::{
     files::{Outputs, write_whole},
     listed,
 };
-use stretch_gap::{Diagnosis, Knowledge, SliceGap, VerdictKind, Where};
+use stretch_gap::{Diagnosis, Knowledge, ParameterShift, SliceGap, VerdictKind, Where};
 use stretch_problem::{ByTrial, Examined, Fixed, Implementation, effect_in_words, notation};
 use stretch_report::{
     Table, baseline_table, candidate_numbers_table, candidate_table, difference_table, run_table,
@@ -53,7 +53,9 @@ pub(crate) fn text(
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
     candidates(&mut out, diagnosis, is_verbose);
-    parameters(&mut out, diagnosis);
+    if diagnosis.verdict != VerdictKind::NoGap {
+        parameters(&mut out, &diagnosis.parameters, !diagnosis.named.is_empty());
+    }
     identifiability(&mut out, diagnosis, is_verbose);
     implement(&mut out, implementations, diagnosis);
     transfer(&mut out, diagnosis);
@@ -191,27 +193,33 @@ fn implement(out: &mut Vec<String>, all: &[Implementation], diagnosis: &Diagnosi
     }
 }
 
-fn parameters(out: &mut Vec<String>, diagnosis: &Diagnosis) {
-    let moved: Vec<_> =
-        diagnosis.parameters.iter().filter(|p| p.sigmas.abs() > 1.0 || bent(p) > 1.0).collect();
-    if moved.is_empty() || diagnosis.verdict == VerdictKind::NoGap {
+/// Lists the nominal parameters that changed by more than their tolerance, in the model with the
+/// named effects (`is_named`) or without effects.
+fn parameters(out: &mut Vec<String>, shifts: &[ParameterShift], is_named: bool) {
+    let has_moved = |p: &&ParameterShift| p.sigmas.abs() > 1.0 || p.bent_sigmas.abs() > 1.0;
+    let moved: Vec<&ParameterShift> = shifts.iter().filter(has_moved).collect();
+    if moved.is_empty() {
         return;
     }
-    out.push(
-        "\nNominal parameters that changed by more than their tolerance, with the effect or without it:"
-            .to_owned(),
-    );
+    let fits = if is_named { ", with the effect or without it" } else { "" };
+    out.push(format!("\nNominal parameters that changed by more than their tolerance{fits}:"));
     let rows = moved.iter().map(|p| {
-        vec![
-            p.name.clone(),
-            number(p.nominal),
-            number(p.fitted),
-            format!("{:+.1}", p.sigmas),
-            if diagnosis.named.is_empty() { "-".to_owned() } else { number(p.bent) },
-        ]
+        let mut row = vec![p.name.clone(), number(p.nominal), number(p.fitted)];
+        row.push(format!("{:+.1}", p.sigmas));
+        if is_named {
+            row.extend([number(p.bent), format!("{:+.1}", p.bent_sigmas)]);
+        }
+        row
     });
-    let header = ["parameter", "nominal", "re-tuned", "change, tolerances", "without the effect"];
-    out.push(table(&header, rows));
+    let header = [
+        "parameter",
+        "nominal",
+        "re-tuned",
+        "change, tolerances",
+        "re-tuned without the effect",
+        "change, tolerances",
+    ];
+    out.push(table(&header[..if is_named { 6 } else { 4 }], rows));
 }
 
 /// Reports how many nominal parameters the data determine and, with `is_verbose`, why the others
@@ -232,13 +240,6 @@ fn identifiability(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: boo
     for sentence in others.iter().filter(|_| is_verbose) {
         out.push(format!("- {sentence}"));
     }
-}
-
-/// Returns how far a parameter was changed to hide the effect, in tolerances.
-fn bent(p: &stretch_gap::ParameterShift) -> f64 {
-    let tolerance = (p.fitted - p.nominal) / p.sigmas;
-    let far = ((p.bent - p.fitted) / tolerance).abs();
-    if far.is_finite() { far } else { 0.0 }
 }
 
 fn transfer(out: &mut Vec<String>, diagnosis: &Diagnosis) {
@@ -325,4 +326,35 @@ pub(super) fn write_snippets(
         })
     })?;
     Ok(format!("wrote {shown}: {} files", files.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use stretch_gap::ParameterShift;
+
+    /// A parameter that changed only in the fit without the effect has its change in that column.
+    #[test]
+    fn changes_of_both_fits_are_listed() {
+        let shift = |name: &str, sigmas, bent_sigmas| ParameterShift {
+            name: name.to_owned(),
+            unit: String::new(),
+            nominal: 2.0,
+            fitted: 2.0 + 0.1 * sigmas,
+            sd: 0.01,
+            sigmas,
+            bent: 2.0 + 0.1 * bent_sigmas,
+            bent_sigmas,
+            is_evidence: true,
+        };
+        let shifts =
+            [shift("hidden", 0.0, 3.0), shift("kept", 0.2, -0.2), shift("moved", -2.0, 0.1)];
+        let mut out = Vec::new();
+        super::parameters(&mut out, &shifts, true);
+        let text = out.join("\n");
+        assert!(text.contains("+0.0") && text.contains("+3.0") && text.contains("-2.0"), "{text}");
+        assert!(!text.contains("kept"), "{text}");
+        let mut alone = Vec::new();
+        super::parameters(&mut alone, &shifts[..1], false);
+        assert!(!alone.join("\n").contains("effect"), "{alone:?}");
+    }
 }

@@ -136,6 +136,9 @@ pub struct ParameterShift {
     pub sigmas: f64,
     /// Value after re-tuning without effects.
     pub bent: f64,
+    /// Distance of `bent` from the nominal value, in tolerances.
+    #[serde(default)]
+    pub bent_sigmas: f64,
     /// Whether the value is evidence by itself. It is not if other parameters can compensate for
     /// it.
     pub is_evidence: bool,
@@ -358,6 +361,7 @@ pub(crate) fn shifts(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<Para
         sd: evidence.best_sd[i],
         sigmas: (fitted[i] - p.nominal) / p.sd,
         bent: bent[i],
+        bent_sigmas: (bent[i] - p.nominal) / p.sd,
         is_evidence: p.is_evidence,
     })
     .collect()

@@ -507,6 +507,8 @@ fn report(
     let model_runs = runs.counted();
     let spent = model_runs.and_then(|runs| runs.note());
     let cut_short = spent.is_some().then(|| searched.not_looked_at());
+    let count = simulator.effects().len().max(1);
+    let none_examined = cut_short.as_ref().is_some_and(|cut| cut.len() == count);
     let is_open = matches!(judged.kind, VerdictKind::Partial | VerdictKind::Unknown);
     let is_searched = is_open && task.depth() > 0 && too_little.is_none() && spent.is_none();
     let mut not_fitted = if is_searched { searched.not_looked_at() } else { Vec::new() };
@@ -534,6 +536,7 @@ fn report(
         sentence: String::new(),
         not_examined,
         cut_short,
+        none_examined,
         not_fitted,
         tied: naming.tied(),
         named,

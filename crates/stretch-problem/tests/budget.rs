@@ -93,6 +93,7 @@ fn within(spec: ProblemSpec, budget: Option<usize>) -> (Result<Diagnosis, GapErr
 /// makes a search spend more runs.
 #[test]
 fn every_budget_ends_in_a_diagnosis_or_says_which_is_the_least() {
+    let mut is_early = false;
     for (noise, lag, least, all) in [(0.0, 4, 4, 40), (0.05, 4, 20, 60)] {
         for budget in 1..=all {
             let (found, calls) = within(spec(noise, lag), Some(budget));
@@ -107,6 +108,12 @@ fn every_budget_ends_in_a_diagnosis_or_says_which_is_the_least() {
                         "{budget}"
                     );
                     assert!(found.sentence.starts_with("The budget of runs was spent"));
+                    let all =
+                        found.cut_short.as_ref().unwrap().len() == spec(noise, lag).wrap.len();
+                    let sentence = &found.sentence;
+                    assert_eq!(sentence.contains("before any effect could be examined"), all);
+                    assert!(!all || !sentence.contains("none of the examined"), "{sentence}");
+                    is_early |= all && sentence.contains("There is a gap");
                 }
                 Err(GapError::Spent { budget: told, least: needed }) => {
                     assert!(told == budget && needed == least && budget < least, "{budget}");
@@ -115,4 +122,5 @@ fn every_budget_ends_in_a_diagnosis_or_says_which_is_the_least() {
             }
         }
     }
+    assert!(is_early, "no budget ends before the effects are examined");
 }

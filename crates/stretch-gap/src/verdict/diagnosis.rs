@@ -110,6 +110,9 @@ pub struct Diagnosis {
     /// Effects that were not examined because the budget of runs was used up; none if it was not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cut_short: Option<Vec<String>>,
+    /// Whether the budget of runs was used up before any effect was examined.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub none_examined: bool,
     /// Effects that a first test left out, so that no set with them was fitted. Listed if the verdict
     /// is `partial` or `unknown`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]

@@ -37,7 +37,15 @@ impl Diagnosis {
     pub fn in_sentences(&self, probability: &dyn Fn(f64) -> String) -> String {
         let Some(answer) = &self.answer else { return self.sentence.clone() };
         let proposed = self.proposed.as_ref().map_or(String::new(), |p| format!(" {}", p.sentence));
-        self.preface() + &answer.in_sentences(nouns(self.gauge_alone), probability) + &proposed
+        let nouns = nouns(self.gauge_alone);
+        let finding = match answer {
+            Answer::Unknown { stage, left, .. } if self.none_examined => format!(
+                "There is a gap in {stage}: the re-tuned {} leaves {left:.2} times the noise.",
+                nouns[0]
+            ),
+            answer => answer.in_sentences(nouns, probability),
+        };
+        self.preface() + &finding + &proposed
     }
 
     /// Returns what to do next, in a sentence; empty for a diagnosis without an
@@ -66,6 +74,9 @@ impl Diagnosis {
                 &format!("Add {them} to the {simulator}, then diagnose again.")
             }
             Some(Answer::WrongRecord { .. }) => "Correct this error, then diagnose again.",
+            Some(Answer::Unknown { .. }) if self.none_examined => {
+                "Diagnose again with a larger budget of runs."
+            }
             Some(Answer::Unknown { .. })
                 if self.proposed.as_ref().is_some_and(|p| !p.equation.is_empty()) =>
             {
@@ -99,6 +110,9 @@ impl Diagnosis {
     pub fn preface(&self) -> String {
         let mut out = match &self.cut_short {
             None => String::new(),
+            Some(_) if self.none_examined => {
+                "The budget of runs was spent before any effect could be examined. ".to_owned()
+            }
             Some(rest) if rest.is_empty() => {
                 "The budget of runs was spent before the search was over. ".to_owned()
             }

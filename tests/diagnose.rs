@@ -318,7 +318,7 @@ fn a_saturated_channel_is_noticed_with_its_share() {
     // nothing else.
     let first = text.lines().next().unwrap();
     let named =
-        ["the amplifier's saturation", "the sleeve's slack"].iter().any(|e| first.contains(e));
+        ["the amplifier's saturation", "the sensor's slack"].iter().any(|e| first.contains(e));
     assert!(named || !first.contains("lacks"), "{text}");
 }
 

@@ -55,7 +55,7 @@ fn a_gauge_is_told_by_columns_rig_file_or_missing_openings() {
     let scratch = Scratch::new();
     let named = |text: &str| {
         let first = text.lines().next().unwrap();
-        assert!(first.contains("the time offset between bridge and length"), "{text}");
+        assert!(first.contains("the time offset between signal and reference"), "{text}");
     };
     // One trial and two columns. Report and JSON agree with the text.
     let file = scratch.path("joint.csv");

@@ -111,7 +111,7 @@ fn with_gxx_an_arduino_library_reads_a_sample_every_period() {
         assert_eq!(lines.len(), 153, "{said}");
         // a number that no code of the converter has, and its last code
         assert_eq!(lines[151..], ["missing", "missing"], "{said}");
-        assert!(lines[60].contains("mm inflation"), "{said}");
+        assert!(lines[60].contains("mm falling"), "{said}");
     }
 }
 

@@ -155,14 +155,16 @@ impl Listener {
 /// Returns the expected rows of a recording of these frames, without the time.
 fn rows<'a>(frames: impl IntoIterator<Item = &'a Frame>) -> Vec<String> {
     use stretch_link::Answer;
+    let target = example_calibration().spec().target;
     let row = |frame: &Frame| {
         let volts = due().volts(AdcCode(frame.code)).unwrap();
         match frame.answer {
             Answer::Reading { thousandths, branch, domain } => format!(
-                "{volts},{},{}.{:03},{branch},{domain}",
+                "{volts},{},{}.{:03},{},{domain}",
                 frame.code,
                 thousandths / 1000,
-                thousandths % 1000
+                thousandths % 1000,
+                target.branch_name(branch)
             ),
             _ => format!("{volts},{},,,warming", frame.code),
         }

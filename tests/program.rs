@@ -54,7 +54,7 @@ fn calibrate_apply_evaluate() {
     for (estimate, truth) in text.lines().zip(truth.lines()).skip(12) {
         let (estimate, truth): (Vec<_>, Vec<_>) =
             (estimate.split(',').collect(), truth.split(',').collect());
-        assert!(["inflation", "deflation"].contains(&estimate[3]), "{estimate:?}");
+        assert!(["rising", "falling"].contains(&estimate[3]), "{estimate:?}");
         squares += (estimate[1].parse::<f64>().unwrap() - truth[1].parse::<f64>().unwrap()).powi(2);
         count += 1;
     }

@@ -235,7 +235,8 @@ impl CalibrationRecord {
 
     /// A receptor that runs the calibration live.
     fn receptor(&self) -> PyResult<Receptor> {
-        LiveReceptor::new(self.calibration()).map(|live| Receptor { live }).map_err(said)
+        let target = self.calibration().spec().target;
+        LiveReceptor::new(self.calibration()).map(|live| Receptor { live, target }).map_err(said)
     }
 
     /// Estimates of a whole recording, equal to those of a live receptor, with NaN for samples without an estimate.

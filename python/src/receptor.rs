@@ -15,10 +15,7 @@ pub(crate) struct Reading {
     /// The rate is NaN while the rate estimator of a line or of a curve still warms up, because these two models give estimates
     /// without a rate.
     rate: f64,
-    /// Direction of motion, `"rising"` or `"falling"`.
-    ///
-    /// The direction is that of the calibrated quantity. A length that is calibrated as a contraction becomes shorter while the
-    /// direction is `"rising"`.
+    /// Direction in which the reference moves, `"rising"` or `"falling"`.
     branch: &'static str,
     /// Position of the sample relative to the fitted range.
     ///
@@ -55,6 +52,7 @@ impl Reading {
 #[derive(Debug)]
 pub(crate) struct Receptor {
     pub(crate) live: LiveReceptor,
+    pub(crate) target: Target,
 }
 
 #[pymethods]
@@ -84,7 +82,7 @@ impl Receptor {
         Some(Reading {
             estimate: reading.estimate,
             rate: reading.rate,
-            branch: Target::Direct.branch_name(reading.branch),
+            branch: self.target.branch_name(reading.branch),
             domain: reading.domain.to_string(),
             sd: reading.sd,
         })

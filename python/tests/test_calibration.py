@@ -62,6 +62,16 @@ def test_live_steps_give_the_bits_of_the_whole_recording(tested, poly13):
     assert receptor.faults["missing"] == 100
 
 
+def test_a_branch_is_the_direction_of_the_reference():
+    length_mm = 150 + 20 * np.cos(1.5 * np.arange(0, 20, 0.01))
+    calibration = stretch_gap.calibrate(0.02 * length_mm, length_mm, 100.0, model="poly13", reference_name="length_mm")
+    receptor = calibration.receptor()
+    readings = filter(None, (receptor.step(0.01 * n, 0.02 * x) for n, x in enumerate(length_mm)))
+    moving = [reading for reading in readings if abs(reading.rate) > 15]
+    assert len(moving) > 100
+    assert all(reading.branch == ("rising" if reading.rate > 0 else "falling") for reading in moving)
+
+
 def test_auto_shows_what_it_chose_from():
     pairs = [recording(seed, 1.0 + 0.3 * seed, 8.0) for seed in range(3)]
     signals, angles = zip(*pairs)

@@ -13,7 +13,7 @@ use std::{
 
 use anyhow::Context;
 use stretch_calibrate::{BoardReceptor, converter_reach, parse_adc, read_calibration};
-use stretch_core::{Branch, Calibration, Interval, RateEstimator, Runner, Volts};
+use stretch_core::{Branch, Calibration, Interval, RateEstimator, Runner, Target, Volts};
 use stretch_data::files::is_standard_output;
 use stretch_link::{Answer, Decoder, Event, TimeLine};
 use stretch_receptor::{
@@ -204,7 +204,7 @@ impl Samples {
             self.twin.reset();
         }
         let time_s = self.time_line.time_s(&event, self.begun.elapsed().as_secs_f64());
-        let sample = Sample::new(time_s.unwrap_or(f64::NAN), frame, &self.adc);
+        let sample = Sample::new(time_s.unwrap_or(f64::NAN), frame, &self.adc, self.twin.target);
         match frame.code {
             code if code < 0 => self.status.missing += 1,
             code if sample.signal.is_none() => {
@@ -253,6 +253,8 @@ pub(super) struct Twin {
     pub unit: String,
     /// Sample period, s, if the file contains it.
     pub period_s: Option<f64>,
+    /// The target, if the file contains it.
+    target: Option<Target>,
     receptor: Own,
 }
 
@@ -286,6 +288,7 @@ impl Twin {
             signal: "signal".to_owned(),
             unit: String::new(),
             period_s: None,
+            target: None,
             receptor: Own::Codes(receptor),
         })
     }
@@ -300,6 +303,7 @@ impl Twin {
             signal: calibration.spec().signal.as_str().to_owned(),
             unit: calibration.spec().reference.unit().to_owned(),
             period_s: Some(calibration.spec().sample_rate_hz.period_s()),
+            target: Some(calibration.spec().target),
             receptor,
         })
     }

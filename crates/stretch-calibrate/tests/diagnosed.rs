@@ -16,7 +16,7 @@ const DIAGNOSED: ModelKind = ModelKind::Remembering { kind: Memory::Diagnosed, r
 struct Gauge {
     /// Relative overshoot, with a time constant of 0.25 s.
     overshoot: f64,
-    /// Half-width of the sleeve's slip, in strokes.
+    /// Half-width of the sensor's slip, in strokes.
     slip: f64,
     /// Change of the gauge's drive by a pressure of 600 kPa, as a share of a stroke.
     crosstalk: f64,

@@ -55,10 +55,16 @@ impl Branch {
 }
 
 impl core::fmt::Display for Branch {
+    /// Writes the direction of the target. [`Target::branch_name`](crate::Target::branch_name) returns that of the
+    /// reference.
+    ///
+    /// ```
+    /// assert_eq!(stretch_core::Branch::Inflation.to_string(), "target_rises");
+    /// ```
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.pad(match self {
-            Self::Inflation => "inflation",
-            Self::Deflation => "deflation",
+            Self::Inflation => "target_rises",
+            Self::Deflation => "target_falls",
         })
     }
 }

@@ -70,19 +70,22 @@ impl Target {
         self.reference_per_target() * range.span()
     }
 
-    /// Returns the name of a branch: `inflation` or `deflation` for a contraction, `rising` or `falling` otherwise.
+    /// Returns the direction in which the reference moves on a branch: `rising` or `falling`. The reference falls as a
+    /// contraction rises.
     ///
     /// ```
     /// use stretch_core::{Branch, Target};
     /// assert_eq!(Target::Direct.branch_name(Branch::Deflation), "falling");
-    /// assert_eq!(Target::Contraction { rest_length: 90.0 }.branch_name(Branch::Deflation), "deflation");
+    /// assert_eq!(Target::Contraction { rest_length: 90.0 }.branch_name(Branch::Deflation), "rising");
     /// ```
     pub const fn branch_name(self, branch: Branch) -> &'static str {
         match (self, branch) {
-            (Self::Contraction { .. }, Branch::Inflation) => "inflation",
-            (Self::Contraction { .. }, Branch::Deflation) => "deflation",
-            (Self::Direct, Branch::Inflation) => "rising",
-            (Self::Direct, Branch::Deflation) => "falling",
+            (Self::Contraction { .. }, Branch::Deflation) | (Self::Direct, Branch::Inflation) => {
+                "rising"
+            }
+            (Self::Contraction { .. }, Branch::Inflation) | (Self::Direct, Branch::Deflation) => {
+                "falling"
+            }
         }
     }
 }

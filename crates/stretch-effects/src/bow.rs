@@ -176,8 +176,8 @@ pub(crate) static GAUGE_NONLINEARITY: Effect = Effect {
 /// Non-linearity of the potentiometer.
 pub(crate) static POT_NONLINEARITY: Effect = Effect {
     name: "pot_nonlinearity",
-    title: "the potentiometer's non-linearity",
-    words: "the potentiometer's scale bends",
+    title: "the reference sensor's non-linearity",
+    words: "the scale of the reference sensor bends",
     stage: RigStage::Reference,
     equation: "L_meas = L + c 4 y (1 - y)(1 + skew (2 y - 1)), y = k/k_max",
     parameters: &[

@@ -140,8 +140,8 @@ fn reached(values: &[f64], e: &Extent) -> [Option<f64>; 2] {
 /// Slack of the sleeve: the gauge cannot be compressed.
 pub(crate) static SLEEVE_SLACK: Effect = Effect {
     name: "sleeve_slack",
-    title: "the sleeve's slack",
-    words: "the sleeve goes slack when the muscle is short",
+    title: "the sensor's slack",
+    words: "the sensor goes slack at the short end",
     equation: "e -> e_s + knee ln(1 + exp((e - e_s)/knee)): cannot fall below e_s",
     parameters: &[
         // If the pre-stretch is unknown, so is the slack strain. It may then be negative in the nominal rig's strain.

@@ -115,8 +115,8 @@ pub static BACKLASH: Kind = Kind {
 /// Slip of the sleeve on the muscle.
 pub(crate) static SLEEVE_SLIP: Effect = Effect {
     name: "sleeve_slip",
-    title: "the sleeve's slip",
-    words: "the sleeve slips on the muscle before it follows",
+    title: "the sensor's slip",
+    words: "the sensor slips on what carries it before it follows",
     equation: "e -> mean of play(e, w {1 - spread, 1, 1 + spread})",
     parameters: &[
         EffectParameter::strength("w", "strain", 0.0, 0.03, 0.008),
@@ -142,8 +142,8 @@ pub(crate) static SLEEVE_SLIP: Effect = Effect {
 /// Backlash of the potentiometer. A calibration built on a diagnosis undoes it in the reference to which it is fitted.
 pub(crate) static POT_BACKLASH: Effect = Effect {
     name: "pot_backlash",
-    title: "the potentiometer's backlash",
-    words: "the potentiometer has backlash",
+    title: "the reference sensor's backlash",
+    words: "the reference sensor has backlash",
     stage: RigStage::Reference,
     equation: "L_meas = mean of play(L, w {1 - spread, 1, 1 + spread})",
     parameters: &[

@@ -220,8 +220,8 @@ pub(crate) fn read_at(late: &str, signals: &Signals) -> Sketch {
 /// Time offset between the bridge and the length.
 pub(crate) static CHANNEL_SKEW: Effect = Effect {
     name: "channel_skew",
-    title: "the time offset between bridge and length",
-    words: "the bridge is sampled earlier or later than the length",
+    title: "the time offset between signal and reference",
+    words: "the signal is sampled earlier or later than the reference",
     equation: "bridge samples show the length of skew_s + rate t earlier, t since the trial began, first and last value held",
     parameters: &[
         EffectParameter::strength("skew_s", "s", -0.1, 0.2, 0.02),

@@ -92,10 +92,7 @@ fn live(header: &Header, name: &str) -> String {
     has.extend(header.array.is_none().then_some("one"));
     has.extend(header.pressure.then_some("pressure"));
     let pins: Vec<String> = (0..header.array.unwrap_or(0)).map(|k| format!("A{k}")).collect();
-    let [rising, falling] = header.branches;
     named(header, &kept(include_str!("arduino/Live.ino"), &has))
         .replace("@NAME@", name)
         .replace("@PINS@", &pins.join(", "))
-        .replace("@RISING@", rising)
-        .replace("@FALLING@", falling)
 }

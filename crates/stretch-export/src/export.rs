@@ -7,7 +7,7 @@ use stretch_calibrate::{
     fixed_record,
 };
 use stretch_core::{
-    Branch, Calibration, Interval, Label, Model, Provenance, SampleRate, Target, record::checksum,
+    Calibration, Interval, Label, Model, Provenance, SampleRate, Target, record::checksum,
 };
 use stretch_receptor::code::Adc;
 use stretch_sleeve::{ArrayCalibration, ArrayChannel, GaugeCalibration, Turns, array_seal};
@@ -83,9 +83,6 @@ pub struct Header {
     pub array: Option<usize>,
     /// The resolution of an estimate in integers, with its unit; `None` for `float`.
     pub step: Option<String>,
-    /// Names of the rise and the fall of the reference: `deflation` and `inflation` for a contraction, otherwise
-    /// `rising` and `falling`.
-    pub branches: [&'static str; 2],
     /// The signals of a step, with their calibrated ranges.
     pub signals: Vec<(Label, Interval)>,
     /// The column of the reference.
@@ -341,29 +338,17 @@ fn assembled(
     text += "\n#endif\n";
     let id = format!("0x{:08x}u", checksum(text.as_bytes()));
     let text = text.replace("@ID@", &id);
-    let branches = rise_and_fall(source.target).map(|branch| source.target.branch_name(branch));
     let (step, adc) = (source.step(form), options.adc);
     let (signals, reference) = (source.signals, source.reference.clone());
     let (array, notes) = (None, Vec::new());
-    Header { text, form, model, pressure, array, step, branches, signals, reference, adc, notes }
-}
-
-/// Returns the branches on which the reference rises and falls.
-fn rise_and_fall(target: Target) -> [Branch; 2] {
-    let rise =
-        if target.reference_per_target() < 0.0 { Branch::Deflation } else { Branch::Inflation };
-    [rise, rise.opposite()]
+    Header { text, form, model, pressure, array, step, signals, reference, adc, notes }
 }
 
 /// Returns the constants of the branches.
 fn branches(target: Target) -> String {
-    let [up, down] = rise_and_fall(target).map(|branch| match branch {
-        Branch::Inflation => "RISES",
-        Branch::Deflation => "FALLS",
-    });
-    let has: &[&str] =
-        if matches!(target, Target::Contraction { .. }) { &["contraction"] } else { &[] };
-    kept(include_str!("c/branches.h"), has).replace("@UP@", up).replace("@DOWN@", down)
+    let falls = target.reference_per_target() < 0.0;
+    let [up, down] = if falls { ["FALLS", "RISES"] } else { ["RISES", "FALLS"] };
+    include_str!("c/branches.h").replace("@UP@", up).replace("@DOWN@", down)
 }
 
 /// Returns the opening comment, which describes the file to its readers.

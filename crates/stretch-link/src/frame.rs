@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crc::{CRC_32_ISCSI, Crc, NoTable};
-use stretch_core::Branch;
+use stretch_core::{Branch, Target};
 use stretch_receptor::{Domain, Withheld, code::CodeReading};
 
 use crate::text::{Writer, number};
@@ -44,30 +44,45 @@ pub enum Answer {
     Missing,
 }
 
-impl fmt::Display for Answer {
-    /// Writes the last cells of a row of a recording: estimate in the reference's unit, branch and domain, or two empty
-    /// cells and the reason why there is no estimate.
+impl Answer {
+    /// Returns the last cells of a row of a recording: estimate in the reference's unit, branch and domain, or two empty
+    /// cells and the reason why there is no estimate. If the target of the calibration is known, the branch is the
+    /// direction of the reference, otherwise that of the target.
     ///
     /// ```
     /// use stretch_link::Answer;
-    /// use stretch_core::Branch;
+    /// use stretch_core::{Branch, Target};
     /// use stretch_receptor::Domain;
     ///
     /// let (branch, domain) = (Branch::Inflation, Domain::Inside);
     /// let reading = Answer::Reading { thousandths: -512, branch, domain };
-    /// assert_eq!(reading.to_string(), "-0.512,inflation,inside");
-    /// assert_eq!(Answer::Warming.to_string(), ",,warming");
+    /// assert_eq!(reading.cells(Some(Target::Direct)).to_string(), "-0.512,rising,inside");
+    /// assert_eq!(reading.cells(None).to_string(), "-0.512,target_rises,inside");
+    /// assert_eq!(Answer::Warming.cells(None).to_string(), ",,warming");
     /// ```
+    pub fn cells(self, target: Option<Target>) -> impl fmt::Display {
+        Cells(self, target)
+    }
+}
+
+/// An answer and the target of its calibration, if that is known.
+struct Cells(Answer, Option<Target>);
+
+impl fmt::Display for Cells {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Reading { thousandths, branch, domain } => {
-                let (sign, size) =
-                    (if thousandths < 0 { "-" } else { "" }, thousandths.unsigned_abs());
-                write!(f, "{sign}{}.{:03},{branch},{domain}", size / 1000, size % 1000)
-            }
-            Self::Warming => f.write_str(",,warming"),
-            Self::Missing => f.write_str(",,missing"),
+        let Self(answer, target) = *self;
+        let (thousandths, branch, domain) = match answer {
+            Answer::Reading { thousandths, branch, domain } => (thousandths, branch, domain),
+            Answer::Warming => return f.write_str(",,warming"),
+            Answer::Missing => return f.write_str(",,missing"),
+        };
+        let (sign, size) = (if thousandths < 0 { "-" } else { "" }, thousandths.unsigned_abs());
+        write!(f, "{sign}{}.{:03},", size / 1000, size % 1000)?;
+        match target {
+            Some(target) => f.write_str(target.branch_name(branch))?,
+            None => write!(f, "{branch}")?,
         }
+        write!(f, ",{domain}")
     }
 }
 

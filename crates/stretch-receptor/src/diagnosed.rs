@@ -87,7 +87,7 @@ pub struct Diagnosed<T> {
     pub ahead_s: T,
     /// Factor from the filter's standard deviation to the one that is reported, in reference units.
     pub spread: T,
-    /// Half-width of the sleeve's slip.
+    /// Half-width of the sensor's slip.
     pub slip: T,
     /// A sleeve counts as reversed when the signal has come back by more than this.
     pub turn_threshold: T,

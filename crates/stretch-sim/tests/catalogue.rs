@@ -77,6 +77,17 @@ fn every_effect_is_looked_for_within_its_ranges() {
     assert_eq!(search.starts.len(), 2 * 3);
 }
 
+/// A gauge alone has neither a muscle nor a potentiometer.
+#[test]
+fn effects_of_a_gauge_alone_are_described_without_the_rig() {
+    for effect in CATALOGUE.iter().filter(|e| Gauge::accepts(e, false)) {
+        for part in ["muscle", "sleeve", "potentiometer", "valve"] {
+            let text = format!("{}; {}", effect.title, effect.words);
+            assert!(!text.contains(part), "{}: {text}", effect.name);
+        }
+    }
+}
+
 #[test]
 fn forms_that_are_left_out_are_neutral() {
     for effect in CATALOGUE {

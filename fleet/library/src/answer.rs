@@ -119,7 +119,7 @@ fn answer<const TERMS: usize>(degree: Degree, is_line: bool, outcome: &Outcome<T
     }
 }
 
-/// Fits all sides, inflation first, and determines whether signal and reference rise together.
+/// Fits all sides, the rising reference first, and determines whether signal and reference rise together.
 fn fitted<const TERMS: usize>(
     degree: Degree,
     is_line: bool,
@@ -145,8 +145,8 @@ fn fitted<const TERMS: usize>(
     let (sides, names) = match (up, down) {
         (Some(line), None) if is_line => (vec![line], ["the line", ""]),
         (Some(up), Some(down)) => match polarity {
-            Polarity::Rising => (vec![up, down], ["inflation", "deflation"]),
-            Polarity::Falling => (vec![down, up], ["inflation", "deflation"]),
+            Polarity::Rising => (vec![up, down], ["rising reference", "falling reference"]),
+            Polarity::Falling => (vec![down, up], ["rising reference", "falling reference"]),
         },
         (Some(_), None) => return Err(one_branch("falls", "a rate of 0 or above", rows)),
         _ => return Err(one_branch("rises", "a rate below 0", rows)),
@@ -191,7 +191,7 @@ struct Side<const TERMS: usize> {
     fit: Fit<f64, TERMS>,
 }
 
-/// A complete fit: a line, or inflation and deflation.
+/// A complete fit: a line, or a surface for each direction of the reference.
 struct Whole<'a, const TERMS: usize> {
     sides: &'a [Side<TERMS>],
     polarity: Polarity,

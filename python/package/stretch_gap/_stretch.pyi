@@ -45,11 +45,7 @@ class Reading:
         """
     @property
     def branch(self) -> str:
-        """Direction of motion, `"rising"` or `"falling"`.
-
-        The direction is that of the calibrated quantity. A length that is calibrated as a contraction becomes shorter while the
-        direction is `"rising"`.
-        """
+        """Direction in which the reference moves, `"rising"` or `"falling"`."""
     @property
     def domain(self) -> str:
         """Position of the sample relative to the fitted range.

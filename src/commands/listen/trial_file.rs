@@ -6,6 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use stretch_core::Target;
 use stretch_data::push_number;
 use stretch_link::{Answer, Frame};
 use stretch_receptor::code::{Adc, AdcCode};
@@ -21,15 +22,17 @@ pub(crate) struct Sample {
     /// The estimate, in the unit of the reference; `None` if the board withholds it.
     pub estimate: Option<f64>,
     pub frame: Frame,
+    /// The target of the calibration, if its file contains it.
+    pub target: Option<Target>,
 }
 
 impl Sample {
-    pub(crate) fn new(time_s: f64, frame: Frame, adc: &Adc) -> Self {
+    pub(crate) fn new(time_s: f64, frame: Frame, adc: &Adc, target: Option<Target>) -> Self {
         let estimate = match frame.answer {
             Answer::Reading { thousandths, .. } => Some(f64::from(thousandths) / 1000.0),
             _ => None,
         };
-        Self { time_s, signal: adc.volts(AdcCode(frame.code)), estimate, frame }
+        Self { time_s, signal: adc.volts(AdcCode(frame.code)), estimate, frame, target }
     }
 
     /// Appends `time_s,signal,code,estimate,branch,domain`; missing values are empty.
@@ -40,7 +43,7 @@ impl Sample {
             push_number(line, signal);
         }
         // Writing to memory cannot fail.
-        let _ = writeln!(line, ",{},{}", self.frame.code, self.frame.answer);
+        let _ = writeln!(line, ",{},{}", self.frame.code, self.frame.answer.cells(self.target));
     }
 }
 

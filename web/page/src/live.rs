@@ -6,7 +6,7 @@ use std::fmt::Write;
 use stretch_calibrate::{
     Doubt, LiveReceptor, Seen, calibration_from_json, converter_reach, parse_adc,
 };
-use stretch_core::{Calibration, Interval, Runner, Volts};
+use stretch_core::{Calibration, Interval, Runner, Target, Volts};
 use stretch_data::push_number;
 use stretch_link::{Answer, Decoder, Event, Frame, TimeLine};
 use stretch_receptor::{
@@ -148,6 +148,7 @@ struct Frames {
     adc: Adc,
     time_line: TimeLine,
     twin: Option<Runner<Receptor<f64>>>,
+    target: Option<Target>,
     /// Number of estimates compared with those computed here, and the largest difference.
     compared: (u64, f64),
     /// Samples that the board did not get from its converter.
@@ -171,6 +172,7 @@ impl Frames {
                 calibration.map_or(1e-3, |c| c.spec().sample_rate_hz.period_s()),
             ),
             twin: calibration.map(Receptor::new).transpose()?.map(Runner::new),
+            target: calibration.map(|c| c.spec().target),
             compared: (0, 0.0),
             missing: 0,
             beyond: (0, 0),
@@ -205,7 +207,7 @@ impl Frames {
             return None;
         };
         match signal {
-            Some(signal) => push_line(lines, time_s, signal, &frame),
+            Some(signal) => push_line(lines, time_s, signal, &frame, self.target),
             None if frame.code < 0 => self.missing += 1,
             None => self.beyond = (self.beyond.0 + 1, self.beyond.1.max(frame.code)),
         }
@@ -251,12 +253,12 @@ impl Frames {
 }
 
 /// Appends a row in the format of `stretch listen`.
-fn push_line(lines: &mut String, time_s: f64, signal: f64, frame: &Frame) {
+fn push_line(lines: &mut String, time_s: f64, signal: f64, frame: &Frame, target: Option<Target>) {
     push(lines, time_s);
     lines.push(',');
     push(lines, signal);
     // Writing to a string cannot fail.
-    let _ = writeln!(lines, ",{},{}", frame.code, frame.answer);
+    let _ = writeln!(lines, ",{},{}", frame.code, frame.answer.cells(target));
 }
 
 fn push(lines: &mut String, value: f64) {

@@ -76,7 +76,7 @@ void loop() {
   Serial.print(reading.estimate, 3);
 @end
   Serial.print(" " STRETCH_UNIT);
-  Serial.print(reading.branch == STRETCH_RISING ? " @RISING@" : " @FALLING@");
+  Serial.print(reading.branch == STRETCH_RISING ? " rising" : " falling");
   Serial.println(reading.domain == STRETCH_INSIDE ? "" : " outside the calibrated domain");
 @end
 @if array

@@ -1,10 +1,6 @@
 /* Direction in which the reference moves: stretch_reading.branch. */
 #define STRETCH_RISING STRETCH_TARGET_@UP@
 #define STRETCH_FALLING STRETCH_TARGET_@DOWN@
-@if contraction
-/* The target of the calibration is a contraction, which rises as the reference falls. The program stretch
- * calls STRETCH_FALLING inflation and STRETCH_RISING deflation. */
-@end
 #define STRETCH_TARGET_RISES 0
 #define STRETCH_TARGET_FALLS 1
 

@@ -22,7 +22,7 @@ pub(crate) fn diagnosed_float(calibration: &Calibration) -> Result<Part, ExportE
     if model.slip > 0.0 {
         has.push("slip");
         constants
-            .define("SLIP", model.slip, "half-width of the sleeve's slip")
+            .define("SLIP", model.slip, "half-width of the sensor's slip")
             .define("SMOOTH", SMOOTH as f32, "share of a sample in the smoothed signal")
             .define("TURN_THRESHOLD", model.turn_threshold, "smallest signal change of a turn")
             .define("SLIP_VARIANCE", model.slip_variance, "SLIP^2/3: target anywhere in the slip")

@@ -64,8 +64,9 @@ pub struct ArrayGains<const N: usize> {
 pub struct ArrayShifts<const N: usize> {
     /// Length of a block, in seconds.
     pub block_s: f64,
-    /// The rate of false alarms of all channels together, from which the limits are derived. It holds for movements
-    /// like those in the calibration.
+    /// The number from which the limits are derived: the rate of false alarms of all channels together, if all blocks
+    /// were drawn like those of the calibration. It is no statement about other days and movements, whose blocks
+    /// deviate more.
     pub false_alarms_an_hour: f64,
     /// Usual mean of each channel's difference, in the reference's unit.
     pub usual: Values<N>,

@@ -17,7 +17,7 @@ const VALUES_A_SECOND: f64 = 10.0;
 /// estimate from all others ([`ArrayReceptor::differences`]), taken ten times a second. The
 /// deviation of the gauge is the mean of `d` in a block minus the usual mean, in the reference's
 /// unit, and `r` is the deviation divided by the limit in the calibration
-/// ([`ArrayShifts`](crate::ArrayShifts)), which also states the rate of false alarms.
+/// ([`ArrayShifts`](crate::ArrayShifts)).
 ///
 /// If `|r|` of any gauge exceeds 1, some gauge has shifted. A shift of one gauge changes the
 /// differences of all gauges, and that of another gauge may change more relative to its limit. The

@@ -7,8 +7,8 @@
 //!    `faint_rise`.
 //! 4. The effects of the smaller set may leave up to the share `model_discrepancy` of what they
 //!    close, because their forms differ from those of the rig. An effect that closes no more than
-//!    that must close most of what is left, and the likelihood by octaves must rise by `faint_rise`,
-//!    because a discrepancy is slow and raises it little.
+//!    that must close most of what is left, and the score or the likelihood by octaves must rise by
+//!    `faint_rise`.
 //!
 //! The criteria must also hold if [deviations](crate::fit::deviations) from the usual forms of the
 //! effects are added to both sets. What a deviation explains is not evidence for a further effect.
@@ -57,13 +57,12 @@ impl Acceptance<'_> {
         let all = 0..base.misfits.len();
         let closed: f64 = all.map(|stage| self.problem.closes(base, next, stage)).sum();
         let is_beyond = self.exceeds_discrepancy(base, next, new);
-        let is_faint = closed < self.thresholds.null_excess;
-        let (least_octaves, of_left) = match is_beyond || is_faint {
-            true => (rise, if is_beyond { share } else { MOST }),
-            false => (self.thresholds.faint_rise, MOST),
-        };
-        next.score - base.score > self.least_rise(closed)
-            && self.problem.rise(base, next) > least_octaves
+        let (risen, octaves) = (next.score - base.score, self.problem.rise(base, next));
+        let is_strong = is_beyond || risen.max(octaves) > self.thresholds.faint_rise;
+        let of_left = if is_beyond { share } else { MOST };
+        is_strong
+            && risen > self.least_rise(closed)
+            && octaves > rise
             && closed >= of_left * self.left(base, new)
     }
 

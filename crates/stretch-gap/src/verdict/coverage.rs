@@ -10,6 +10,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use stretch_data::in_digits;
 
 use crate::problem::{
     record_facts::RowsUsed,
@@ -52,20 +53,16 @@ impl TooLittle {
                 100.0 * LEAST_SHARE
             ),
             Self::Short { fit_s, test_s, block_s } => {
-                let (least_fit_s, least_test_s) =
-                    (seconds(LEAST_FIT * block_s), seconds(LEAST_TEST * block_s));
+                let [least_fit_s, least_test_s] =
+                    [LEAST_FIT, LEAST_TEST].map(|blocks| in_digits(blocks * block_s, 2));
+                let [fit_s, test_s] = [fit_s, test_s].map(|s| in_digits(*s, 3));
                 format!(
-                    "The recording is too short to name an effect: {fit_s:.1} s to fit and {test_s:.1} s to test on. Record at least \
+                    "The recording is too short to name an effect: {fit_s} s to fit and {test_s} s to test on. Record at least \
                      {least_fit_s} s to fit and {least_test_s} s to test on; without test trials four times {least_test_s} s in all."
                 )
             }
         }
     }
-}
-
-/// Formats seconds, with a decimal for small values.
-fn seconds(s: f64) -> String {
-    if s < 4.95 { format!("{s:.1}") } else { format!("{s:.0}") }
 }
 
 /// Number of blocks for fitting below which different lags cannot be distinguished.
@@ -78,7 +75,8 @@ pub(crate) fn too_little(roles: &SampleRoles, rows: RowsUsed, dt_s: f64) -> Opti
     }
     let (fit, test) = (fitted(roles), roles.blocks(Role::Test));
     let block_s = roles.block as f64 * dt_s;
-    (fit < LEAST_FIT || test < LEAST_TEST).then_some(TooLittle::Short {
+    // Rounded, because a recording of 20 s may lack some samples.
+    (fit.round() < LEAST_FIT || test.round() < LEAST_TEST).then_some(TooLittle::Short {
         fit_s: fit * block_s,
         test_s: test * block_s,
         block_s,
@@ -120,6 +118,9 @@ mod tests {
         let short = too_little(&roles(375, 125), RowsUsed { used: 500, read: 500 }, 0.01);
         assert_eq!(short, Some(TooLittle::Short { fit_s: 3.75, test_s: 1.25, block_s: 0.5 }));
         assert!(short.is_some_and(|why| why.words().contains("Record at least 10 s")));
+        // 20 s without one sample at 100 Hz.
+        assert_eq!(too_little(&roles(1500, 499), all, 0.01), None);
+        assert!(too_little(&roles(1500, 470), all, 0.01).is_some());
         // The same numbers of samples at 500 Hz, for a motion that turns five times a second.
         let quick = SampleRoles { block: 50, ..roles(3000, 1000) };
         assert_eq!(too_little(&quick, all, 0.002), None);

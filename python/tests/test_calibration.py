@@ -100,7 +100,7 @@ def test_integers_lists_and_strided_arrays_are_arrays(fitted):
         (lambda s, a: (s.reshape(2, 1000), a), "give as many"),
         (lambda s, a: (np.zeros_like(s), a), "signal is 0 throughout"),
         (lambda s, a: (s[:1], a[:1]), "1 samples are too few"),
-        (lambda s, a: (["x"] * s.size, a), "does not hold numbers"),
+        (lambda s, a: (["x"] * s.size, a), "sample 0: 'x' is not a number; write NaN"),
     ],
 )
 def test_bad_columns_are_refused_in_a_sentence(fitted, spoil, words):

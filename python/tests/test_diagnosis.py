@@ -1,5 +1,6 @@
 import importlib.util
 import json
+import pickle
 import re
 import sys
 
@@ -147,6 +148,23 @@ def test_what_was_found_is_shown_as_text_table_page_and_code(bent, tmp_path):
     assert found["parameters"] == bent.parameters and found["bend"] == bent.effects["bend"]
 
 
+def test_values_have_intervals(bent):
+    low, high = bent.parameter_intervals["compliance"]
+    assert low < bent.parameters["compliance"] < high and abs(2.1 - bent.parameters["compliance"]) < high - low < 0.01
+    (low, high), value = bent.effect_intervals["bend"]["bend"], bent.effects["bend"]["bend"]
+    assert low < value < high and abs(0.02 - value) < high - low < 0.001
+
+
+def test_a_pickle_has_everything_but_the_simulator(bent):
+    copy, fix = pickle.loads(pickle.dumps((bent, bent.fix())))
+    assert repr(copy) == repr(bent) and copy.report() == bent.report()
+    np.testing.assert_array_equal(copy.curves()["measured"], bent.curves()["measured"])
+    assert fix.effects == bent.effects and "code" not in repr(fix)
+    for one in (fix, copy.fix()):
+        with pytest.raises(stretch_gap.StretchError, match="a copy or a pickle does not contain the simulator"):
+            one.predict({"force_N": FORCE, "length_mm": BENT}, rate_hz=RATE_HZ)
+
+
 def test_curves_are_those_of_the_simulator(bent):
     curves = bent.curves("length_mm")
     np.testing.assert_array_equal(curves["measured"], BENT)
@@ -238,6 +256,17 @@ def test_a_simulator_that_takes_the_first_values_is_called_once_a_recording():
     assert lengths_seen == {2500, FORCE.size - 2500} and starts_seen == {5, -40}
 
 
+def test_a_simulator_finds_the_time_among_its_inputs():
+    def simulate(params, effects, inputs):
+        np.testing.assert_allclose(inputs["time_s"], np.arange(FORCE.size) / RATE_HZ)
+        return params["compliance"] * FORCE
+
+    question = {"effects": None, "wrap": None}
+    assert diagnose(simulator=simulate, length=STIFFER + noise(FORCE.size), **question).verdict == "parameters"
+    with pytest.raises(stretch_gap.StretchError, match=r'time_s is the time .* finds the time in inputs\["time_s"\]'):
+        stretch_gap.diagnose(simulate, {"time_s": FORCE, "length_mm": BENT}, output="length_mm", inputs=["time_s"])
+
+
 def test_a_fix_predicts_new_recordings_and_is_diagnosed_again():
     def spring(params, effects, inputs):
         return params["compliance"] * inputs["force_N"] + effects["bend"] * inputs["force_N"] ** 2
@@ -303,6 +332,22 @@ def test_two_outputs_come_as_a_dict():
     assert found.named == ["heater.output.lag"]
     assert found.where["heat_W"] > 0.9
     assert set(found.how_far["retuned"]) == {"length_mm", "heat_W"}
+
+
+def test_the_index_of_a_data_frame_may_be_the_time(bent):
+    pandas = pytest.importorskip("pandas")
+    time_s = np.arange(FORCE.size) / RATE_HZ
+    frame = pandas.DataFrame({"force_N": FORCE, "length_mm": BENT})
+    start = pandas.Timestamp("2026-01-01", tz="Europe/Berlin")
+    question = {"output": "length_mm", "inputs": "force_N", "effects": {"bend": (-0.05, 0.05)}}
+    question["parameters"] = {"compliance": stretch_gap.Parameter(2.0, relative=0.1, unit="mm/N")}
+    for index in (pandas.Index(time_s, name="t"), start + pandas.to_timedelta(time_s, unit="s")):
+        found = stretch_gap.diagnose(Spring(), frame.set_index(index), wrap=["output.backlash", "output.delay"], **question)
+        assert found.sentence == bent.sentence
+    frame = frame.astype(object)
+    frame.loc[7, "force_N"] = "n/a"
+    with pytest.raises(stretch_gap.StretchError, match="force_N of the recording, sample 7: 'n/a' is not a number"):
+        stretch_gap.diagnose(Spring(), frame, rate_hz=RATE_HZ, **question)
 
 
 def test_recordings_come_in_many_forms(bent):
@@ -421,8 +466,22 @@ def test_answers_that_are_none_say_what_was_expected(answer, words):
 def test_bad_questions_are_refused_in_a_sentence(more, words):
     with pytest.raises(stretch_gap.StretchError, match=words):
         diagnose(Spring(), BENT, **more)
-    with pytest.raises(stretch_gap.StretchError, match="give an object with a method simulate"):
-        diagnose(3, BENT)
+
+
+@pytest.mark.parametrize(
+    ("simulator", "words"),
+    [
+        (3, "give an object with a method simulate"),
+        (
+            lambda params, effects, command: BENT,
+            r"takes \(params, effects, command\), .* only be inputs, first, trials, stage",
+        ),
+        (lambda p, inputs: BENT, "its first two arguments are params and effects"),
+    ],
+)
+def test_a_simulator_of_another_form_is_refused(simulator, words):
+    with pytest.raises(stretch_gap.StretchError, match=words):
+        diagnose(simulator, BENT)
 
 
 def test_columns_of_two_lengths_are_named():

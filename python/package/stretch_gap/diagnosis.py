@@ -13,7 +13,7 @@ from typing import Any
 from . import _stretch, figures, html, timeline
 from . import problem as entries
 from ._stretch import Refused, StretchError
-from .fix import Again, Fix, fix
+from .fix import COPIED, Again, Fix, fix
 from .frames import frame
 from .outputs import replaceable
 from .recordings import Array, unknown
@@ -68,6 +68,11 @@ class Diagnosis:
         self._session = session or {}
         self._again = again
         self._earlier = earlier
+        self._is_copy = False
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy or a pickle contains: everything except the simulator, which often cannot be pickled."""
+        return {**vars(self), "_again": None, "_is_copy": True}
 
     @staticmethod
     def from_json(text: str) -> Diagnosis:
@@ -220,6 +225,27 @@ class Diagnosis:
         for value in self._best_values():
             if value["effect"] in found:
                 found[value["effect"]][value["name"]] = value["value"]
+        return found
+
+    @property
+    def parameter_intervals(self) -> dict[str, tuple[float, float]]:
+        """95 % intervals of the values in `parameters`, dict by name, in the unit of the parameter.
+
+        An interval is the value plus and minus 1.96 standard deviations. It accounts for the uncertainty of all other values that
+        are fitted together with it, and assumes that the simulator with the named effects is correct. The two ends are equal if
+        the parameter is exact.
+        """
+        shifts = self._answer["parameters"]
+        reach = {p["name"]: 1.96 * p.get("sd", 0.0) for p in shifts}
+        return {p["name"]: (p["fitted"] - reach[p["name"]], p["fitted"] + reach[p["name"]]) for p in shifts}
+
+    @property
+    def effect_intervals(self) -> dict[str, dict[str, tuple[float, float]]]:
+        """95 % intervals of the values in `effects`, dict by effect of dicts by argument, within the ranges of the arguments."""
+        found: dict[str, dict[str, tuple[float, float]]] = {name: {} for name in self.named}
+        for value in self._best_values():
+            if value["effect"] in found and "interval" in value:
+                found[value["effect"]][value["name"]] = (value["interval"][0], value["interval"][1])
         return found
 
     def _best_values(self) -> list[dict[str, Any]]:
@@ -375,6 +401,8 @@ class Diagnosis:
         """Return the reason why the fix cannot be run, if it cannot."""
         if not self._session:
             return "the diagnosis was read from text, which does not contain the simulator; diagnose again"
+        if self._is_copy:
+            return COPIED
         if self.verdict == "record":
             return "the recording is wrong, so nothing was fitted to it; correct the recording, and diagnose again"
         return (
@@ -579,9 +607,10 @@ def diagnose(
 
         With several outputs, the simulator returns a dict of arrays by output column. It may take further arguments by name:
 
-        - `inputs`: dict of arrays by column, with all columns that the problem uses. An effect at an input alters the column of
-          this input; the others are as measured. The arrays have the shape `(n, samples)`, and `(samples,)` for a function. If
-          the simulator does not take this argument, effects at the inputs are not examined.
+        - `inputs`: dict of arrays by column, with all columns that the problem uses, and with `time_s`, the time since the
+          start of the recording. The samples are evenly spaced, so `time_s[1]` is the sample time. An effect at an input alters
+          the column of this input; the others are as measured. The arrays have the shape `(n, samples)`, and `(samples,)` for a
+          function. If the simulator does not take this argument, effects at the inputs are not examined.
         - `first`: dict of floats by column, the first measured value of each column in the recording. Use it as the initial
           state, unless every recording starts at rest.
         - `trials`: list with the `name`, `samples` (a slice), `start_s` and `first` of each requested recording.
@@ -589,11 +618,13 @@ def diagnose(
 
         A simulator that takes `inputs` or `first`, but not `trials`, is called once per recording. Any other simulator is
         called once for all recordings end to end. If the simulator has a method `begin(session)`, it is called once, before the
-        first simulation, with everything that stays the same. None runs the simulator that a `problem.toml` names.
+        first simulation, with everything that stays the same, such as the sample time `session["dt_s"]`. None runs the
+        simulator that a `problem.toml` names.
     data : dict of str to array_like, data frame, Trial, str, path-like, or list of these
-        Recordings: arrays or a data frame by column, a `Trial`, the path of a recording (see `read`), or a list of these. Or
-        the path of a `problem.toml`, which defines the problem completely. The arguments `output`, `stages`, `parameters` and
-        `effects` are then errors, and the arguments from `inputs` to `reference` have no effect.
+        Recordings: arrays or a data frame by column (the index of a data frame may be the time), a `Trial`, the path of a
+        recording (see `read`), or a list of these. Or the path of a `problem.toml`, which defines the problem completely. The
+        arguments `output`, `stages`, `parameters` and `effects` are then errors, and the arguments from `inputs` to `reference`
+        have no effect.
     output : str, optional
         Column of the measurement that the simulation is compared with. Give either `output` or `stages`.
     inputs : str or sequence of str, default ()

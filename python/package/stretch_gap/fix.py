@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from html import escape
 from types import NoneType
@@ -18,6 +18,9 @@ from ._stretch import Fixed, StretchError, comment, identifier
 from .around import Around, around
 from .recordings import Array, unknown
 from .simulator import Asked, Named
+
+COPIED = "a copy or a pickle does not contain the simulator; use the original object, or diagnose again"
+"""Reason why a copied fix cannot be run."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +78,7 @@ class Fix:
 
     parameters: dict[str, float]
     effects: dict[str, dict[str, float]]
-    code: str
+    code: str = field(repr=False)
     _again: Again | None = field(default=None, repr=False)
     _written: tuple[Sequence[Mapping[str, Any]], Mapping[str, str]] = field(default=((), {}), repr=False)
     _why_not: str = field(default="", repr=False)
@@ -84,6 +87,10 @@ class Fix:
         asked = self._again and self._again.asked
         if asked:  # `Asked` looks here for the form of a simulator, and finds that of the user's
             vars(self).update({"simulate": self, "batch": asked.batch} if asked.many else {}, __signature__=asked.signature)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy or a pickle contains: everything except the simulator, which often cannot be pickled."""
+        return {**{one.name: getattr(self, one.name) for one in fields(self)}, "_again": None, "_why_not": COPIED}
 
     def __call__(self, params: Any = None, effects: Any = None, *more: Any, **named: Any) -> Any:
         """Run the fixed simulator: the user's simulator with the re-tuned parameters, and the named effects around it.

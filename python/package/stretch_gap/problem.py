@@ -214,11 +214,16 @@ def trials(data: Data, rate_hz: float | None) -> list[Trial]:
         return [one for part in data for one in trials(part, rate_hz)]
     if hasattr(data, "columns") and not isinstance(data, Mapping):  # a data frame of any library
         frame: Any = data
+        index: Any = getattr(frame, "index", None)
+        index = index.tz_convert(None) if getattr(index, "tz", None) else index
         data = {str(name): np.asarray(frame[name]) for name in frame.columns}
+        stamps = np.asarray(index)
+        if (stamps.dtype.kind in "mM" or getattr(index, "name", None) in CLOCKS) and data.keys().isdisjoint(CLOCKS):
+            data["time_s"] = stamps
     if not isinstance(data, Mapping):
         raise StretchError(
-            f"data is a {type(data).__name__}; give a dict of arrays by column, a data frame, a stretch_gap.Trial, the path of a "
-            "recording, or a list of these"
+            f"the type of data is {type(data).__name__}; give a dict of arrays by column, a data frame, a stretch_gap.Trial, the "
+            "path of a recording, or a list of these"
         )
     columns = dict(data)
     time_s = columns.pop("time_s", None)
@@ -247,6 +252,11 @@ def recorded(data: Data, rate_hz: float | None, wanted: Iterable[str]) -> list[t
         held = dict(trial.columns)
         rate, stamps = clock(name, held, trial, rate_hz, wanted)
         missing = [c for c in wanted if c not in held]
+        if missing and missing[0] in CLOCKS and missing[0] in {"time_s", *trial.columns}:
+            raise StretchError(
+                f"{name}: {missing[0]} is the time of the samples, which is no input; leave it out. A simulator that takes the "
+                'argument inputs finds the time in inputs["time_s"]'
+            )
         if missing:
             raise unknown("column", missing[0], held, f"{name}: ")
         channels = [(c, column(held[c], f"{c} of {name}")) for c in wanted]

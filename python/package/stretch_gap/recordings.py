@@ -78,10 +78,20 @@ def column(values: ArrayLike, what: str) -> Array:
     try:
         array = np.ascontiguousarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise StretchError(f"{what} does not hold numbers: {error}") from None
+        raise StretchError(f"{what}{_not_a_number(values) or f' does not hold numbers: {error}'}") from None
     if array.ndim != 1:
         raise StretchError(f"{what} has the shape {array.shape}; give an array of one dimension with one number per sample")
     return array
+
+
+def _not_a_number(values: Any) -> str:
+    """Return the first sample that is not a number, in words, or an empty text."""
+    for sample, value in enumerate(np.asarray(values, dtype=object).flat):
+        try:
+            float(value)
+        except (TypeError, ValueError):
+            return f", sample {sample}: {value!r} is not a number; write NaN where a number is missing"
+    return ""
 
 
 SLOW_S = 1.0
@@ -135,8 +145,8 @@ def times(samples: int, rate_hz: float | None, time_s: ArrayLike | None, what: s
     if back.size:
         before, i = known[back[0] : back[0] + 2]
         raise StretchError(
-            f"time_s of {what}, sample {i}: {stamps[i]} s does not come after {stamps[before]} s; sort the samples, or give "
-            "several recordings as a list"
+            f"time_s of {what}, sample {i}: {stamps[i]:.9g} s does not come after {stamps[before]:.9g} s; sort the samples, "
+            "or give several recordings as a list"
         )
     step_s = float(np.median(steps)) if steps.size and given.dtype.kind not in "mM" else 0.0
     if step_s > SLOW_S or (samples > LONG and step_s > 1.0 / SLOW_HZ):

@@ -6,7 +6,7 @@ calls the simulator that a problem.toml names.
 An object has a method `simulate(params[n, p], effects[n, e]) -> [n, samples]`, which simulates up to `batch` models per call. A
 function takes two dicts of one model and returns `[samples]`. Both may take further arguments by name:
 
-- `inputs`: all columns by name, with the altered values of altered inputs,
+- `inputs`: all columns by name, with the altered values of altered inputs, and `time_s`, the time since the start of the trial,
 - `first`: the first measured value of each column in the trial, by name,
 - `trials`: `name`, `samples`, `start_s` and `first` of each requested trial,
 - `stage`: the number of the requested stage.
@@ -41,6 +41,9 @@ Array = NDArray[np.float64]
 
 BATCH = 64
 """Largest number of models per call if the simulator has no attribute `batch`."""
+
+OPTIONAL = ("inputs", "first", "trials", "stage")
+"""Names of the arguments that a simulator may take after `params` and `effects`."""
 
 
 class Named(np.ndarray[Any, np.dtype[np.float64]]):
@@ -98,6 +101,14 @@ class Asked:
         self.call: Callable[..., Any] = method if self.many else simulator  # type: ignore[assignment]
         self.batch = max(1, int(getattr(simulator, "batch", BATCH))) if self.many else 1
         self.optional = self._optional()
+        try:
+            self.signature.bind({}, {}, **dict.fromkeys(self.optional))
+        except TypeError as error:
+            raise StretchError(
+                f"the simulator takes {self.signature}, but its first two arguments are params and effects, and its further "
+                f"arguments may only be {', '.join(OPTIONAL)}: {error}; rename the arguments, as in simulate(params, effects, "
+                "inputs)"
+            ) from None
 
     @property
     def signature(self) -> inspect.Signature:
@@ -109,7 +120,7 @@ class Asked:
 
     def _optional(self) -> set[str]:
         """Return the optional arguments that the simulator takes."""
-        known = {"inputs", "first", "trials", "stage"}
+        known = set(OPTIONAL)
         taken = self.signature.parameters
         if any(p.kind is inspect.Parameter.VAR_KEYWORD for p in taken.values()):
             return known
@@ -135,7 +146,9 @@ class Asked:
 
         Call `begin` of the simulator.
         """
-        self.columns: dict[str, Array] = session["columns"]
+        dt_s, counts = session.get("dt_s", np.nan), [trial["samples"] for trial in session["trials"]]
+        time_s: Array = np.concatenate([dt_s * np.arange(count) for count in counts] or [np.empty(0)])
+        self.columns: dict[str, Array] = {"time_s": time_s, **session["columns"]}
         self.inputs: list[list[str]] = [stage["inputs"] for stage in session["stages"]]
         self.outputs: list[str] = [stage["output"] for stage in session["stages"]]
         self.parameters: list[str] = session["parameters"]

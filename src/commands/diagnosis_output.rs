@@ -252,6 +252,10 @@ fn transfer(out: &mut Vec<String>, diagnosis: &Diagnosis) {
 
 fn next(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     let Some(next) = &diagnosis.next_experiment else { return };
+    if next.separates.is_empty() {
+        out.push(format!("\n{}", next.why));
+        return;
+    }
     out.push(format!(
             "\nNext experiment: {} ({:.1} min) would distinguish {}: their predictions differ by {} times the noise. {}",
             next.name,

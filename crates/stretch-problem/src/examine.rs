@@ -101,7 +101,7 @@ impl Problem {
             report("looking for the next experiment");
             proposal = source.next(&diagnosis, &evidence)?;
         }
-        diagnosis.next_experiment = proposal.as_ref().map(|p| p.next.clone());
+        diagnosis.set_next_experiment(proposal.as_ref().map(|p| p.next.clone()));
         let notes = &mut diagnosis.notes;
         notes.splice(0..0, source.notes().into_iter().map(Note::from));
         notes.extend(source.afterwards().into_iter().map(Note::from));

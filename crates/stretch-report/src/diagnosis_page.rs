@@ -75,7 +75,7 @@ fn left_over(page: &mut Page, subject: &Subject<'_>) {
         // a plot of the residual shows more than a plot of two curves that nearly coincide
         &trace_figures(subject, stage, &shown).1,
         &format!(
-            "What is left of {channel} in {}, the eight seconds with the largest gap: within two multiples of the noise it is noise.",
+            "What is left of {channel} in {}, the part with the largest gap: within two multiples of the noise it is noise.",
             shown.name
         ),
     );
@@ -106,7 +106,7 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
     if let Some(shown) = shown(subject, stage) {
         let (top, _) = trace_figures(subject, stage, &shown);
         let caption = format!(
-            "{}: {} in {}, the eight seconds with the largest gap.",
+            "{}: {} in {}, the part with the largest gap.",
             spec.name, spec.channel, shown.name
         );
         page.figure(&top, &caption);
@@ -401,6 +401,10 @@ fn detectable(page: &mut Page, d: &Diagnosis) {
 fn next(page: &mut Page, d: &Diagnosis) {
     let Some(next) = &d.next_experiment else { return };
     page.section("What to measure next", "");
+    if next.separates.is_empty() {
+        page.text(&next.why);
+        return;
+    }
     page.text(&format!(
         "{} ({} min) would tell {} apart: whatever their parameters, they differ by {} times the noise. {}",
         next.name.replace('_', " "),

@@ -30,7 +30,8 @@ pub(crate) const GIVEN: &str = "given this catalogue";
 
 /// The next step, in a sentence.
 fn to_do(d: &Diagnosis) -> String {
-    let experiment = d.next_experiment.as_ref().map(|next| {
+    let next = d.next_experiment.as_ref().filter(|next| !next.separates.is_empty());
+    let experiment = next.map(|next| {
         let seconds = 60.0 * next.minutes;
         let long = if seconds < 120.0 {
             format!("{} s", number(seconds, 2))

@@ -78,7 +78,7 @@ pub struct TransferError {
 pub struct NextExperiment {
     /// Name of the experiment.
     pub name: String,
-    /// Effects that it distinguishes.
+    /// Effects that it distinguishes; empty if no candidate experiment is likely to distinguish any.
     pub separates: Vec<String>,
     /// Difference between the predictions that no re-tuning removes, in multiples of the noise.
     pub d: f64,
@@ -264,6 +264,20 @@ impl Diagnosis {
         values.for_each(|value| value.effect = rename(&value.effect));
         self.answer.iter_mut().for_each(|answer| answer.rename(rename));
         self.notes.iter_mut().chain(&mut self.reservations).for_each(|note| note.rename(rename));
+        self.sentence = self.headline();
+    }
+
+    /// Sets the next experiment, and adapts the sentence to it.
+    ///
+    /// ```
+    /// use stretch_gap::Diagnosis;
+    /// fn check(diagnosis: &mut Diagnosis) {
+    ///     diagnosis.set_next_experiment(None);
+    ///     assert!(diagnosis.sentence.contains(&diagnosis.in_sentences(&|p| format!("{p:.2}"))));
+    /// }
+    /// ```
+    pub fn set_next_experiment(&mut self, next: Option<NextExperiment>) {
+        self.next_experiment = next;
         self.sentence = self.headline();
     }
 

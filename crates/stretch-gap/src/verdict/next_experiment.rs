@@ -31,6 +31,9 @@ use crate::{
 
 /// Evidence that distinguishes two hypotheses with 95 % probability, nats.
 const ENOUGH: f64 = 3.0;
+/// Describes the next experiment if there is none.
+const HOPELESS: &str =
+    "The rivals are so alike that none of the candidate experiments is likely to distinguish them.";
 /// Share of an effect parameter's range over which a sensitivity is computed.
 const SMALL: f64 = 0.02;
 
@@ -122,12 +125,13 @@ pub fn next_experiment<L: Laboratory>(
     rated.sort_by(|a, b| value(b).total_cmp(&value(a)));
     let Some(&(best, d)) = rated.first().filter(|r| r.1.is_finite()) else { return Ok(None) };
     let chosen = &experiments[best].0;
+    let repeats = repeats(d, chosen.runs_min());
     let next = NextExperiment {
         name: chosen.name.clone(),
-        separates,
+        separates: if repeats.is_some() { separates } else { Vec::new() },
         d,
         minutes: chosen.minutes(),
-        why: chosen.how.clone() + &repeats(d, chosen.runs_min()),
+        why: repeats.map_or(HOPELESS.to_owned(), |more| chosen.how.clone() + &more),
     };
     let trial = chosen.trial.clone();
     let rated =
@@ -174,15 +178,13 @@ fn rate<L: Laboratory>(
 }
 
 /// Returns a sentence on how often the experiment must be run to distinguish the hypotheses; empty
-/// if one run suffices.
-fn repeats(d: f64, minutes: f64) -> String {
+/// if one run suffices, `None` if no number of runs is likely to.
+fn repeats(d: f64, minutes: f64) -> Option<String> {
     let nats = 0.5 * d * d * 60.0 * minutes / BLOCK_S;
     match (ENOUGH / nats).ceil() {
-        n if n <= 1.0 => String::new(),
-        n if n <= 20.0 => format!(" One run is probably not enough: plan {n} runs."),
-        _ => {
-            " The rivals are so alike that none of the candidate experiments is likely to distinguish them.".into()
-        }
+        n if n <= 1.0 => Some(String::new()),
+        n if n <= 20.0 => Some(format!(" One run is probably not enough: plan {n} runs.")),
+        _ => None,
     }
 }
 
@@ -397,13 +399,11 @@ mod tests {
     #[test]
     fn runs_are_planned_where_one_will_hardly_do() {
         // A minute contains 120 blocks, so d^2 = 0.05 gives 3 nats.
-        assert_eq!(repeats(0.05_f64.sqrt() + 1e-9, 1.0), "");
-        assert_eq!(
-            repeats(0.02_f64.sqrt() + 1e-9, 1.0),
-            " One run is probably not enough: plan 3 runs."
-        );
-        assert!(repeats(1e-3, 1.0).contains("so alike that none of the candidate experiments"));
-        assert!(repeats(0.0, 1.0).contains("so alike that none of the candidate experiments"));
+        let planned = |d| repeats(d, 1.0);
+        assert_eq!(planned(0.05_f64.sqrt() + 1e-9).as_deref(), Some(""));
+        let three = planned(0.02_f64.sqrt() + 1e-9);
+        assert_eq!(three.as_deref(), Some(" One run is probably not enough: plan 3 runs."));
+        assert_eq!((planned(1e-3), planned(0.0)), (None, None));
     }
 
     #[test]

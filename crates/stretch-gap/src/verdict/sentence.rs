@@ -67,6 +67,9 @@ impl Diagnosis {
                 "Check whether the noise is larger than stated. If it is not, something small is missing."
             }
             Some(answer) if answer.effects().iter().any(MissingEffect::is_tied) => {
+                if self.next_experiment.as_ref().is_some_and(|next| next.separates.is_empty()) {
+                    return "Measure another quantity that tells them apart before you build on one.".into();
+                }
                 "Run an experiment that tells them apart before you build on one."
             }
             Some(Answer::Missing { effects, .. } | Answer::Partly { effects, .. }) => {
@@ -368,6 +371,7 @@ fn with_share(effect: &MissingEffect) -> String {
     let share = match effect.closes {
         share if share <= 0.0 => "nothing on its own".to_owned(),
         share if share < LEAST_SHARE_IN_WORDS => "less than 1 %".to_owned(),
+        share if (0.995..1.0).contains(&share) => "over 99 %".to_owned(),
         share => format!("{:.0} %", 100.0 * share),
     };
     let end = if effect.at_bound { ", at the end of its range" } else { "" };

@@ -20,7 +20,7 @@ use crate::{
     verdict::{
         answer::{Answer, Findings},
         coverage::TooLittle,
-        diagnosis::{Diagnosis, Unexplained, VerdictKind},
+        diagnosis::{Diagnosis, NextExperiment, Unexplained, VerdictKind},
         judge::{Judged, Overruled},
         naming::Naming,
         notes::answer_notes,
@@ -358,6 +358,28 @@ fn every_answer_has_its_words() {
     // The tests of reports read these values.
     let values = serde_json::to_string_pretty(&values).expect("written");
     is_in_file(&folder.join("answers.json"), &(values + "\n"));
+}
+
+/// If no candidate experiment distinguishes the alternatives, the sentence does not ask for one.
+#[test]
+fn the_next_step_follows_from_the_next_experiment() {
+    let (measured, plain, evidence) = line_and_lag();
+    let tied = missing(&[PLAY]).tied(PLAY, LOOP);
+    let mut told = tied.told(&measured, (&plain, &evidence));
+    for (separates, step) in [
+        (vec![PLAY.to_owned(), LOOP.to_owned()], "Next: run an experiment that tells them apart"),
+        (Vec::new(), "Next: measure another quantity that tells them apart"),
+    ] {
+        let (name, why) = ("slow".to_owned(), String::new());
+        told.set_next_experiment(Some(NextExperiment {
+            name,
+            separates,
+            d: 1.0,
+            minutes: 1.0,
+            why,
+        }));
+        assert!(told.sentence.contains(step), "{}", told.sentence);
+    }
 }
 
 /// Every sentence that names effects also lists parameters at the ends of their tolerances, because

@@ -104,6 +104,30 @@ impl Columns {
                 }
             }
         }
+        let still: Vec<String> =
+            stages.iter().flat_map(|stage| self.still_wrapped(stage)).collect();
+        self.notes.extend(still);
+    }
+
+    /// Returns a note for each input of a stage that may wrap as its output does, but was not unwrapped because it also
+    /// has other large steps.
+    fn still_wrapped(&self, stage: &StageEntry) -> Vec<String> {
+        let Some(turn) = self.turn_of(&stage.output) else { return Vec::new() };
+        let is_wrapped = |name: &&String| {
+            let Some(values) = self.of(name).filter(|_| self.turn_of(name).is_none()) else {
+                return false;
+            };
+            let (low, high) = stretch_data::ends(values);
+            high - low <= 1.01 * turn && values.windows(2).any(|w| (w[1] - w[0]).abs() > 0.9 * turn)
+        };
+        let note = |name: &String| {
+            format!(
+                "{name} jumps by nearly a full turn and is not unwrapped, because it also has other large steps; {} is unwrapped: if {name} \
+                 wraps, unwrap it before the diagnosis",
+                stage.output
+            )
+        };
+        stage.inputs.iter().filter(is_wrapped).map(note).collect()
     }
 
     /// Trials that come from recordings with an index of at least `first`.

@@ -1,11 +1,12 @@
 //! A kind of effect on a channel of a stage.
 
-use std::{ops::Range, sync::Arc};
+use std::{collections::BTreeSet, ops::Range, sync::Arc};
 
-use stretch_data::{Quantity as Measured, ends};
+use stretch_data::{Quantity as Measured, ends, in_digits};
 use stretch_effects::{
     Beside, EffectParameter, Extent, Grid, KINDS, Kind, Quantity, Search, Side, Signals, Sketch,
-    Span, Start, kinds::VISCOUS_FRICTION,
+    Span, Start,
+    kinds::{QUANTISATION, VISCOUS_FRICTION},
 };
 use stretch_gap::EffectSpec;
 
@@ -90,7 +91,9 @@ pub(crate) fn placed(
             };
             let usual = kind.usual.contains(&site.side);
             let why = match own.is_empty() {
-                _ if !is_asked(usual) => None,
+                _ if !is_asked(usual) => {
+                    is_asked(true).then(|| not_usual(kind, site, extent, among)).flatten()
+                }
                 true => lack(kind, site, sites, among),
                 false => (!is_asked(is_usual(kind, site, among))).then(|| {
                     let stage = &among.stages[site.stage].name;
@@ -127,6 +130,30 @@ pub(crate) fn placed(
     Ok(all)
 }
 
+/// Largest distance of a value from a grid, in steps, and the least number of different values, for a column whose
+/// values are said to be on the grid.
+const OFF_GRID: f64 = 0.1;
+const LEVELS: usize = 10;
+
+/// Why a kind that `all` leaves out may be needed: the values of an output are on a coarse grid.
+fn not_usual(kind: &Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Option<String> {
+    if kind.name != QUANTISATION.name || site.side != Side::Output {
+        return None;
+    }
+    let mut steps = among.columns.of(&site.column)?.iter().map(|x| x / extent.lattice);
+    let levels: BTreeSet<i64> = steps.clone().map(|step| step.round() as i64).collect();
+    let is_on = |step: f64| (step - step.round()).abs() <= OFF_GRID;
+    (levels.len() >= LEVELS && steps.all(is_on)).then(|| {
+        format!(
+            "{} is not looked for at {}, although its values are multiples of {}; to look for it, add {} to wrap",
+            kind.title,
+            site.column,
+            in_digits(extent.lattice, 3),
+            named(site, among, kind.name)
+        )
+    })
+}
+
 /// The error for a pattern that matches no wrapper.
 fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
     // `load_friction(load_N)` is friction, too
@@ -139,10 +166,23 @@ fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
             "give the stage velocity = \"COLUMN\", or position = \"COLUMN\", from which the velocity is computed",
         );
     }
-    let names: Vec<&str> = all.iter().map(|p| p.name.as_str()).chain(["all"]).collect();
-    let mut shown: Vec<&str> = names.clone();
-    shown.dedup();
-    ProblemError::unknown("wrap", "wrapper", pattern, shown.iter().copied())
+    let names = all.iter().map(|p| p.name.as_str()).chain(["all"]);
+    let mut error = ProblemError::unknown("wrap", "wrapper", pattern, names);
+    if let ProblemError::Unknown { known, .. } = &mut error {
+        // 50 names would hide what to do
+        let place = |p: &Placed| Some(format!("{}KIND", &p.name[..p.name.rfind(p.kind.name)?]));
+        let distinct = |mut names: Vec<String>| {
+            let mut seen = BTreeSet::new();
+            names.retain(|name| seen.insert(name.clone()));
+            names.join(", ")
+        };
+        *known = format!(
+            "all, {}, with the kinds {}",
+            distinct(all.iter().filter_map(place).collect()),
+            distinct(all.iter().map(|p| p.kind.name.to_owned()).collect())
+        );
+    }
+    error
 }
 
 fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
@@ -166,7 +206,7 @@ fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
     }
     Err(ProblemError::value(
         format!("column {column}"),
-        format!("it is {} in every sample that may be fitted", extent.low),
+        format!("it is {} in every sample that may be fitted", extent.low + 0.0),
         "the channel is dead: check the sensor and its cable, or leave out its wrappers",
     ))
 }

@@ -267,6 +267,27 @@ def test_a_simulator_finds_the_time_among_its_inputs():
         stretch_gap.diagnose(simulate, {"time_s": FORCE, "length_mm": BENT}, output="length_mm", inputs=["time_s"])
 
 
+def test_notes_name_what_may_have_been_overlooked():
+    def notes(simulator, data, inputs, wrap=None, parameters=None):
+        more = {"inputs": inputs, "rate_hz": RATE_HZ, "wrap": wrap, "parameters": parameters}
+        return "\n".join(stretch_gap.diagnose(simulator, data, output=list(data)[-1], **more).notes)
+
+    data = {"force_N": FORCE, "length_mm": 0.5 * np.round(2.0 * (STIFFER + noise(FORCE.size)))}
+    named = ["output.all", "output.quantisation"]
+    ignored = {"mass": (1.0, 0.1), "damping": (2.0, 0.2)}
+    said = notes(lambda params, effects: STIFFER, data, "force_N", "output.all", ignored)
+    assert "although its values are multiples of 0.5; to look for it, add output.quantisation to wrap" in said
+    assert "no change of mass or damping changes the simulation: check that the simulator uses" in said
+    assert "multiples" not in notes(lambda params, effects: STIFFER, data, "force_N", named[1:])
+    # A command that wraps, and also steps by more than a quarter of a turn.
+    command = np.cumsum(np.repeat(np.random.default_rng(2).uniform(-100.0, 110.0, 60), 100)) / 100.0
+    command += np.repeat(np.random.default_rng(3).uniform(-80.0, 80.0, 60), 100)
+    moved = np.convolve(command, np.ones(100) / 100.0)[: command.size] + noise(command.size)
+    wrapped = {name: (column + 180.0) % 360.0 - 180.0 for name, column in [("sent_deg", command), ("angle_deg", moved)]}
+    said = notes(lambda params, effects: moved, wrapped, "sent_deg")
+    assert "angle_deg jumps by 360 deg" in said and "sent_deg jumps by nearly a full turn and is not unwrapped" in said
+
+
 def test_a_fix_predicts_new_recordings_and_is_diagnosed_again():
     def spring(params, effects, inputs):
         return params["compliance"] * inputs["force_N"] + effects["bend"] * inputs["force_N"] ** 2
@@ -405,14 +426,14 @@ def test_values_that_are_refused_turn_the_fit_back():
     [
         (lambda length: length[:-1], r"returned the shape \(5999,\) for length_mm; \(6000,\) was expected"),
         (lambda length: np.zeros((2, length.size)), r"the shape \(2, 6000\) for length_mm; \(6000,\) was expected"),
-        (lambda length: np.where(np.arange(length.size) == 50, np.nan, length), r"gave NaN at 0\.5 s of trial"),
+        (lambda length: np.where(np.arange(length.size) == 50, np.nan, length), r"gave NaN at 0\.5 s of the recording"),
         (lambda length: "six", "returned text; return real numbers in the output's unit"),
         (lambda length: length + 0j, "returned complex numbers"),
         (lambda length: length.astype("datetime64[ns]"), "returned times"),
         (lambda length: length.astype("timedelta64[ns]"), "returned durations"),
         (lambda length: {"length_mm": [str(x) for x in length]}, "returned text for length_mm"),
         (lambda length: [None] + [[1.0]] * 5999, "returned no numbers"),
-        (lambda length: np.ma.masked_array(length, np.arange(length.size) == 50), r"gave NaN at 0\.5 s of trial"),
+        (lambda length: np.ma.masked_array(length, np.arange(length.size) == 50), r"gave NaN at 0\.5 s of the recording"),
         (lambda length: {"width_mm": length}, "returned no length_mm; it returned width_mm"),
         (lambda length: None, "the simulator returned None; is a return statement missing"),
         (lambda length: {"length_mm": None}, "the simulator returned None for length_mm; is a return"),

@@ -45,9 +45,9 @@ use crate::{
         judge::{Case, Judged, judge},
         note::Note,
         notes::{
-            answer_notes, detection_limit_note, extrapolation_notes, friction_note,
-            gross_error_notes, implausible_noise_notes, lost_note, not_fitted_note, recorder_notes,
-            retuning_notes, start_notes, swing_notes,
+            answer_notes, dead_parameters_note, detection_limit_note, extrapolation_notes,
+            friction_note, gross_error_notes, implausible_noise_notes, lost_note, not_fitted_note,
+            recorder_notes, retuning_notes, start_notes, swing_notes,
         },
     },
 };
@@ -515,6 +515,8 @@ fn report(
     not_fitted.retain(|name| !not_examined.contains(name));
     notes.extend(not_fitted_note(&not_fitted));
     notes.extend(friction_note(simulator, &naming.named));
+    let identifiability = searched.problem.identified();
+    notes.extend(dead_parameters_note(&identifiability));
     notes.extend(spent.map(Note::from));
     let no_name = is_quiet.then(|| detection_limit_note(&detection_limits, simulator.effects()));
     notes.extend(no_name.flatten());
@@ -553,7 +555,7 @@ fn report(
         detection_limits,
         location,
         parameters: shifts(simulator, &evidence),
-        identifiability: searched.problem.identified(),
+        identifiability,
         transfer: None,
         next_experiment: None,
         baselines: match options.baselines {
@@ -590,7 +592,13 @@ fn unexplained(
     let mut loud = localise::slices(simulator, evidence, |s| &s.residual_after, seed);
     loud.retain(|s| s.stands_out && s.stage == stage);
     loud.sort_by(|a, b| b.excess.total_cmp(&a.excess));
-    let sits =
-        loud.iter().take(REPORTED_SLICES).map(|s| format!("{}: {}", s.by, s.slice)).collect();
+    let mut sits: Vec<String> = Vec::new();
+    for slice in loud.iter().take(REPORTED_SLICES) {
+        let axis = format!("{}: ", slice.by);
+        match sits.iter_mut().find(|one| one.starts_with(&axis)) {
+            Some(one) => *one += &format!(", {}", slice.slice),
+            None => sits.push(axis + &slice.slice),
+        }
+    }
     Unexplained { share: 1.0 - first.closed, stage, sits }
 }

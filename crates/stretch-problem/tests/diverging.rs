@@ -191,14 +191,14 @@ fn re_tuned_parameters_that_diverge_on_test_trials_end_nothing() {
         );
         let lost = said.iter().find(|n| n.contains(" could not be simulated, "));
         let lost = lost.expect("a note on lost runs");
-        assert!(lost.contains(" s of trial t1.csv"), "{lost}");
+        assert!(lost.contains(" s of t1.csv"), "{lost}");
         assert!(!told.not_examined.is_empty(), "{said:?}");
     }
 }
 
 #[test]
 fn answers_beyond_all_squares_are_refused_with_trial_time_and_value() {
-    for (trial, from_s) in [(0, "0 s of trial t0.csv"), (1, "0 s of trial t1.csv")] {
+    for (trial, from_s) in [(0, "0 s of t0.csv"), (1, "0 s of t1.csv")] {
         for (beyond, shown) in [(1e160, "1e160"), (-1e200, "-1e200"), (f64::INFINITY, "inf")] {
             let told = spring_told(2.0, &["output.backlash"], move |compliance, own, u| {
                 if own == trial { beyond } else { compliance * u }

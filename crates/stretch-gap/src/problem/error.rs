@@ -50,7 +50,7 @@ pub enum GapError {
     },
     /// A simulated output was not finite, or so large that the sum of its squares would overflow.
     #[error(
-        "{stage}: the simulation gave {value:e} at {time_s} s of trial {trial}, which is no output of a machine{}",
+        "{stage}: the simulation gave {value:e} at {time_s} s of {trial}, which is no output of a machine{}",
         in_parentheses(.asked)
     )]
     NotFinite {

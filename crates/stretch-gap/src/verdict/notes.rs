@@ -10,7 +10,12 @@ use crate::{
         gathered::{Evidence, StageEvidence},
         sanity::Sanity,
     },
-    fit::{metric::Metric, prepared::PreparedProblem, swing::Swing},
+    fit::{
+        identifiability::{Identified, Knowledge},
+        metric::Metric,
+        prepared::PreparedProblem,
+        swing::Swing,
+    },
     problem::{
         record_facts::nouns,
         runs::Runs,
@@ -52,10 +57,9 @@ fn gross_misfit(
     let (stage, share) = left.filter(|(_, share)| **share > sanity.allowed)?;
     let spec = &simulator.stages()[stage];
     Some(format!(
-        "{:.0} % of what {} does is not in the {model} of {}: is it the right {rig}, and is every column what its name says?",
+        "{:.0} % of what {} does is not in the {model}: is it the right {rig}, and is every column what its name says?",
         100.0 * share.min(1.0),
-        spec.channel,
-        spec.name
+        spec.channel
     ))
 }
 
@@ -88,6 +92,18 @@ pub(crate) fn friction_note(simulator: &dyn Simulator, named: &[String]) -> Opti
     let text = ": dry friction inside the machine looks alike, and the simulator declares none; to compare the two, declare \
         the friction as an effect of the simulator";
     Some(Note::default().effect(name).text(text))
+}
+
+/// Returns a note that lists the parameters that change no simulated output.
+pub(crate) fn dead_parameters_note(identifiability: &[Identified]) -> Option<Note> {
+    let dead = identifiability.iter().filter(|one| one.knowledge == Knowledge::Dead);
+    let names: Vec<&str> = dead.map(|one| one.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        Note::from(format!(
+            "no change of {} changes the simulation: check that the simulator uses what it receives, and that the recordings excite it",
+            names.join(" or ")
+        ))
+    })
 }
 
 /// Returns a note that lists the effects that were screened and not fitted.

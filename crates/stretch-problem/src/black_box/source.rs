@@ -123,7 +123,7 @@ pub enum SourceError {
         trials: usize,
     },
     /// A sample is not a finite number.
-    #[error("stage {stage}: the simulator gave {value} at {time_s} s of trial {trial}")]
+    #[error("stage {stage}: the simulator gave {value} at {time_s} s of {trial}")]
     NotFinite {
         /// The stage.
         stage: String,
@@ -137,7 +137,7 @@ pub enum SourceError {
     /// The same run was requested twice and answered differently, so that no difference between two
     /// models can be trusted.
     #[error(
-        "stage {stage}: the simulator answers {}, {first} and then {second} in row {row} of trial {trial}; {}",
+        "stage {stage}: the simulator answers {}, {first} and then {second} in row {row} of {trial}; {}",
         question(.over),
         if over[0] == over[1] { "seed its random numbers, and begin every run from the same state" } else { "let no sample depend on later ones" }
     )]

@@ -383,7 +383,7 @@ fn what_a_simulator_answers_wrongly_is_told() {
     });
     assert_eq!(
         broken,
-        "stage servo: the simulator gave NaN at 10 s of trial t1.csv (asked for gain = 10 deg/V, tau = 0.1 s, zero = 0 deg, bias = 0 V, \
+        "stage servo: the simulator gave NaN at 10 s of t1.csv (asked for gain = 10 deg/V, tau = 0.1 s, zero = 0 deg, bias = 0 V, \
          sides = 0)"
     );
 }

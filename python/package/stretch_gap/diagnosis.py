@@ -274,8 +274,8 @@ class Diagnosis:
 
         The experiment is searched only if `diagnose` is called with `experiment=True`. The dict holds among others `name`,
         `why` (a sentence that describes the experiment), `minutes` (its duration), `separates` (the effects that it
-        distinguishes) and `columns` (a dict of arrays with the commands and `time_s`). The commands begin at the first recorded
-        values and are no faster than the recorded ones.
+        distinguishes; empty if no experiment is likely to) and `columns` (a dict of arrays with the commands and `time_s`). The
+        commands begin at the first recorded values and are no faster than the recorded ones.
         """
         found = self._answer.get("next_experiment")
         return {**found, "columns": dict(self._experiment or {})} if found else None

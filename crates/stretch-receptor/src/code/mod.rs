@@ -6,9 +6,9 @@
 //! samples like [`StretchReceptor`](crate::StretchReceptor). It evaluates the surface
 //!
 //! - in 32-bit fixed point ([`FixedReceptor`]), with the estimate in thousandths of the reference's
-//!   unit. A step takes about 100 instructions on any Cortex-M; or
-//! - in `f32` ([`CodeReceptor<f32, ..>`](CodeReceptor)), with the estimate in the reference's unit.
-//!   A step takes about 900 instructions on a Cortex-M3, most of them for six products and six sums.
+//!   unit: about 100 instructions a step on any Cortex-M;
+//! - in `f32` ([`CodeReceptor<f32, ..>`](CodeReceptor)), with the estimate in the reference's unit:
+//!   about 900 instructions a step on a Cortex-M3, most of them for six products and six sums.
 //!
 //! [`FixedObserver`] is the integer receptor for the observer, a model with memory.
 //!

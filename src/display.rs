@@ -182,6 +182,11 @@ pub(crate) fn warn(text: impl Display) {
     }
 }
 
+/// Prints a doubt about a result to standard error, after the program's name, also with `-q`.
+pub(crate) fn doubt(text: impl Display) {
+    write_err(&wrapped(&plain(&format!("stretch: {text}"))));
+}
+
 /// Prints an error to standard error, after the program's name.
 pub(crate) fn fail(text: impl Display) {
     let text = wrapped(&plain(&format!("stretch: {text}")));

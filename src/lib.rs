@@ -38,7 +38,7 @@ use display::Volume;
 #[derive(Parser)]
 #[command(name = "stretch", version, verbatim_doc_comment, max_term_width = 100, after_help = STATUSES)]
 struct Cli {
-    /// Print only results and errors
+    /// Print only results, doubts about them, and errors
     ///
     /// For a diagnosis, a calibration or an evaluation, print only its sentence.
     #[arg(short, long, global = true, conflicts_with = "verbose", display_order = 900)]

@@ -183,15 +183,15 @@ fn a_reference_that_is_off_throughout_is_remarked_on_with_what_to_do() {
     let log = trial(&scratch, "millimetres.csv", "time_s,length_mm,bridge_v", 1.0);
     let record = scratch.path("cal.json");
     runs(&mut calibrate(&log, &record));
-    let told = |log: &std::path::Path| {
+    let told = |logs: &[&std::path::Path]| {
         let mut evaluate = stretch();
-        let output = evaluate.args(["evaluate", "--calibration"]).arg(&record).arg(log).output();
+        let output = evaluate.args(["evaluate", "--calibration"]).arg(&record).args(logs).output();
         let output = output.unwrap();
         assert!(output.status.success());
         one_line(&String::from_utf8(output.stderr).unwrap())
     };
     let text = std::fs::read_to_string(&log).unwrap();
-    let other = |name: &str, change: fn(f64) -> f64| {
+    let other = |name: &str, change: &dyn Fn(f64) -> f64| {
         let row = |line: &str| {
             let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
             format!("{},{:.5},{}\n", cells[0], change(cells[1]), cells[2])
@@ -200,14 +200,24 @@ fn a_reference_that_is_off_throughout_is_remarked_on_with_what_to_do() {
         scratch.write(name, format!("time_s,length_mm,bridge_v\n{rows}"))
     };
     // In centimetres, and on a mount that has moved by 10 mm.
-    for (name, change, off) in [
-        ("centimetres.csv", (|mm| mm / 10.0) as fn(f64) -> f64, "it is 148 mm above"),
+    let members: [(&str, fn(f64) -> f64, &str); 3] = [
+        ("centimetres.csv", |mm| mm / 10.0, "--column 'length_mm=length_mm*10'"),
         ("moved.csv", |mm| mm + 10.0, "it is 10 mm below the reference on average"),
-    ] {
-        let told = told(&other(name, change));
-        assert!(told.contains(off) && told.contains("stretch convert --column"), "{told}");
+        ("moved_a_little.csv", |mm| mm - 2.0, "it is 2 mm above the reference on average"),
+    ];
+    for (name, change, says) in members {
+        let log = other(name, &change);
+        let told = told(&[&log]);
+        assert!(told.contains(says), "{told}");
+        assert_eq!(told.contains("put on again"), name != "centimetres.csv", "{told}");
     }
-    assert!(!told(&other("same.csv", |mm| mm)).contains("on average"));
+    let [same, up, down] = [("same.csv", 0.0), ("up.csv", 10.0), ("down.csv", -10.0)]
+        .map(|(name, by)| other(name, &|mm| mm + by));
+    assert!(!told(&[&same]).contains("on average"));
+    // Shifts in opposite directions cancel in the mean of all trials. Doubts are printed with -q, too.
+    let told = told(&["-q".as_ref(), &same, &up, &down]);
+    assert!(told.contains("cal: up.csv: was the sensor put on again?"), "{told}");
+    assert!(told.ends_with("also down.csv"), "{told}");
 }
 
 #[test]

@@ -18,12 +18,9 @@ use stretch_sleeve::{
 use super::{
     apply_several::apply_several,
     reading::{Recorded, print_note, read_recording, with_notes_printed},
-    shared::RecordedInput,
+    shared::{RecordedInput, with_unit},
 };
-use crate::{
-    display::{Output, detail, warn},
-    table::number,
-};
+use crate::display::{Output, detail, doubt, warn};
 
 /// Turn the voltages of a trial or of a live stream into lengths
 ///
@@ -132,7 +129,7 @@ fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
     let (calibration, applied) = (gauge.calibration(), &found.applied);
     let (seen, doubts) = applied.seen(calibration, trial);
     summarise(&seen, applied.faults);
-    doubts.iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
+    doubts.iter().for_each(doubt);
     // The zero of another signal is no shift.
     if seen.doubt().is_some_and(|doubt| doubt.explains_others()) {
         return;
@@ -146,9 +143,9 @@ fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
 fn summarise(seen: &Seen, faults: Faults) {
     // The count of missing samples saturates at `u32::MAX`.
     let at_least = if faults.missing >= u64::from(u32::MAX) - 1 { "at least " } else { "" };
-    let Seen { samples, withheld, clamped, .. } = seen;
+    let Seen { samples, withheld, limited, clamped, .. } = seen;
     warn(format!(
-        "{samples} samples: {withheld} without an estimate, {clamped} outside the calibrated domain; time stamps: {at_least}{} missing, {} early \
+        "{samples} samples: {withheld} without an estimate, {limited} with a clamped signal or rate ({clamped} outside the calibrated domain); time stamps: {at_least}{} missing, {} early \
          or late",
         faults.missing, faults.jittered,
     ));
@@ -201,9 +198,7 @@ fn live(
                         &zero,
                     );
                 }
-                if let Some(warning) = warning {
-                    warn(format!("stretch: {warning}"));
-                }
+                warning.iter().for_each(doubt);
                 line.clear();
                 push_line(&mut line, row.time_s, &reading, calibration);
                 out.write_all(&line)?;
@@ -215,7 +210,7 @@ fn live(
         say(rows.take_notes());
     }
     summarise(&seen, receptor.faults());
-    seen.doubt().iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
+    seen.doubt().iter().for_each(doubt);
     zero_watch.end();
     Ok(())
 }
@@ -297,7 +292,7 @@ impl ZeroWatch {
         Self {
             turns: gauge.turns().copied(),
             period_s: calibration.spec().sample_rate_hz.period_s(),
-            unit: unit(calibration.spec().reference.as_str()).unwrap_or_default().to_string(),
+            unit: unit(calibration.spec().reference.as_str()).unwrap_or_default().to_owned(),
             trial: if trial.is_empty() { String::new() } else { format!("{trial}: ") },
             shifted: false,
             has_doubt: false,
@@ -308,10 +303,10 @@ impl ZeroWatch {
 
     /// Passes the zero that was determined at the end of a movement, at `time_s`, to `take`. If the signal is doubted,
     /// reports the doubt instead, once, because another signal does not show whether the zero has shifted.
-    fn take_unless(&mut self, doubt: Option<Doubt>, time_s: f64, zero: &Zero<f64>) {
-        let Some(doubt) = doubt else { return self.take(time_s, zero) };
+    fn take_unless(&mut self, found: Option<Doubt>, time_s: f64, zero: &Zero<f64>) {
+        let Some(found) = found else { return self.take(time_s, zero) };
         if !std::mem::replace(&mut self.has_doubt, true) {
-            warn(format!("stretch: {doubt}"));
+            doubt(found);
         }
     }
 
@@ -326,14 +321,13 @@ impl ZeroWatch {
                     u64::from(n) + 1
                 ),
             };
-            warn(format!(
-                "stretch: {}the zero has shifted by {} {unit} since {:.2} s, across a pause: at most {} {unit} is usual {basis}. If the sensor was put \
+            doubt(format!(
+                "{}the zero has shifted by {} since {:.2} s, across a pause: at most {} is usual {basis}. If the sensor was put \
                  on again, calibrate again",
                 self.trial,
-                number(zero.off_reference.abs()),
+                with_unit(zero.off_reference.abs(), &self.unit),
                 time_s - f64::from(zero.since_samples) * self.period_s,
-                number((turns.limit * turns.reference_per_signal).abs()),
-                unit = self.unit,
+                with_unit((turns.limit * turns.reference_per_signal).abs(), &self.unit),
             ));
         }
         self.shifted = zero.has_shifted;
@@ -354,8 +348,8 @@ impl ZeroWatch {
             return;
         };
         if let Some(zero) = self.last.filter(|zero| zero.followed != 0.0) {
-            let followed = number(zero.followed * turns.reference_per_signal);
-            warn(format!("the zero was corrected, by {followed} {} at the end", self.unit));
+            let followed = with_unit(zero.followed * turns.reference_per_signal, &self.unit);
+            warn(format!("the zero was corrected, by {followed} at the end"));
         }
     }
 }

@@ -13,8 +13,11 @@ use stretch_sleeve::{
     MAX_CHANNELS, apply_array,
 };
 
-use super::{apply::write_out, reading::read_recording};
-use crate::{display::warn, table::number};
+use super::{apply::write_out, reading::read_recording, shared::with_unit};
+use crate::{
+    display::{doubt, warn},
+    table::number,
+};
 
 /// Applies the calibration and writes time, estimate, standard deviation, the names of excluded
 /// channels, and whether a state was clamped.
@@ -30,7 +33,7 @@ pub(super) fn apply_several(
     let trial = read_recording(trial, &options)?;
     let applied = apply_array(calibration, &trial)?;
     write_out(out, |out| write_all(calibration, &trial, &applied, out))?;
-    warnings(calibration, &trial, &applied).for_each(|text| warn(format!("stretch: {text}")));
+    warnings(calibration, &trial, &applied).for_each(doubt);
     report(&applied);
     Ok(())
 }
@@ -47,8 +50,7 @@ fn report(applied: &AppliedArray) {
         samples - estimated,
         count(&|reading| reading.lost != 0)
     ));
-    let doubt = Doubt::of_clamped(clamped, estimated);
-    doubt.iter().for_each(|doubt| warn(format!("stretch: {doubt}")));
+    Doubt::of_clamped(clamped, estimated).iter().for_each(doubt);
 }
 
 /// Returns a sentence for each gauge that is left out somewhere, and for each time at which a gauge begins to deviate
@@ -104,15 +106,15 @@ fn shifts<'a>(
         let beyond = |k: &usize| shifts.off[*k].abs() / limits[*k];
         let k = at.into_iter().max_by(|a, b| beyond(a).total_cmp(&beyond(b)))?;
         let name = calibration.spec().channels[k].signal.as_str();
-        let off = number(shifts.off[k].abs());
+        let off = with_unit(shifts.off[k].abs(), unit);
         let which = match &names[..] {
             [_] => format!("{name} has shifted"),
             several => format!("{} has shifted (the data cannot tell which)", several.join(" or ")),
         };
         Some(format!(
-            "{trial}: at {time_s:.2} s, {which}: the estimate from {name} alone differs by at least {off} {unit} from that of the other gauges; in the \
-             calibration it differed by up to {} {unit}. If the gauge was put on again, calibrate again",
-            number(limits[k])
+            "{trial}: at {time_s:.2} s, {which}: the estimate from {name} alone differs by at least {off} from that of the other gauges; in the \
+             calibration it differed by up to {}. If the gauge was put on again, calibrate again",
+            with_unit(limits[k], unit)
         ))
     })
 }

@@ -29,9 +29,8 @@ use super::{
     calibration_text::{blocks_of_calibration, blocks_of_models, blocks_of_notes},
     json::Json,
     reading::{Recorded, columns, read_trials, with_columns_to_name},
-    shared::{Completed, detail, of_files, say_below, say_first, spinner, stage_text},
+    shared::{Completed, detail, of_files, say_below, say_first, spinner, stage_text, with_unit},
 };
-use crate::table::number;
 
 /// Fit a calibration to logged trials
 ///
@@ -121,7 +120,8 @@ pub(crate) struct Args {
     from: Option<PathBuf>,
     /// Prior that these trials update
     ///
-    /// `stretch sleeve learn` writes it. Ten seconds to a minute of reference are enough; without a trial the calibration is the prior.
+    /// `stretch sleeve learn` writes it. For several gauges, ten seconds to a minute of reference are enough; without a trial the
+    /// calibration is the prior. For one gauge, --model auto with 30 s of reference is usually more accurate.
     #[arg(long, value_name = "prior.json")]
     pub(super) prior: Option<PathBuf>,
     /// Sensor, wearer, activity: left/anna
@@ -547,7 +547,7 @@ fn worse_than_a_line(
     let [_, own, line] = &evaluation.pooled[..] else { return None };
     (own.rmse > WORSE * line.rmse).then(|| {
         let unit = &evaluation.unit;
-        let numbers = [own.rmse, line.rmse].map(|rmse| format!("{} {unit}", number(rmse)).trim_end().to_owned());
+        let numbers = [own.rmse, line.rmse].map(|rmse| with_unit(rmse, unit));
         format!(
             "{} is worse than a straight line on the trials of the fit (RMSE {}, linear {}): use --model auto",
             options.model, numbers[0], numbers[1]

@@ -16,9 +16,9 @@ use stretch_sleeve::{
 use super::{
     calibrate::{Args, Signal, other_columns},
     reading::{read_trials, with_columns_to_name},
-    shared::{of_files, say_below, say_first, stage_text},
+    shared::{of_files, say_below, say_first, stage_text, with_unit},
 };
-use crate::table::{maybe, number, table};
+use crate::table::{maybe, table};
 
 /// A calibration to one reference, with the data that `--json` prints.
 #[derive(Serialize)]
@@ -174,12 +174,11 @@ fn record_of(out: &Path, reference: &str) -> PathBuf {
 
 /// Returns the error of a calibration as a sentence.
 fn sentence(made: &Made) -> String {
-    let with_unit =
-        |x: f64| format!("{} {}", number(x), unit_of(&made.reference)).trim_end().to_owned();
+    let unit = unit_of(&made.reference);
     let what = format!("The calibration of {} on {}", made.reference, made.signals.join(", "));
     match (made.rmse, &made.update) {
         (Some(rmse), _) => {
-            let off = with_unit(rmse);
+            let off = with_unit(rmse, &unit);
             format!("{what} is off by {off} (RMSE) on parts of the trials that were not fitted.")
         }
         (None, Some(update)) => {
@@ -189,8 +188,8 @@ fn sentence(made: &Made) -> String {
                 (Some(rmse), Some(half_width)) => format!(
                     "{what}. Earlier sessions with as much reference were off by {} (RMSE) on movements that were left out, and 95 % of their errors \
                      were within {}.",
-                    with_unit(rmse),
-                    with_unit(half_width)
+                    with_unit(rmse, &unit),
+                    with_unit(half_width, &unit)
                 ),
                 _ => format!(
                     "{what}. Its error cannot be estimated, because no session of the prior can be left out for this."

@@ -94,7 +94,7 @@ fn table_of_models(rows: &[&ModelRow], chosen: &str) -> String {
             maybe(r.rmse_arbitrary),
             maybe(r.rmse_pulses),
             maybe(r.rmse_ramps),
-            r.lag_s.map_or("-".to_owned(), |lag| format!("{:.0}", 1e3 * lag)),
+            r.lag_s.map_or("-".to_owned(), |lag| format!("{:.0}", (1e3 * lag).round() + 0.0)),
             maybe(r.worst),
             r.parameters.to_string(),
             instructions(r),

@@ -16,10 +16,10 @@ use super::{
     apply_several::warnings,
     json::Json,
     reading::{Recorded, read_trials, with_columns_to_name},
-    shared::{say_below, say_first, short_name},
+    shared::{say_below, say_first, short_name, with_unit},
 };
-use crate::display::{is_verbose, warn};
-use crate::table::{number, table_text};
+use crate::display::{doubt, is_verbose};
+use crate::table::table_text;
 
 /// Evaluate calibrations on trials that have a reference
 ///
@@ -79,7 +79,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let trials = read_trials(&args.trials, Split::Test, &columns)
         .map_err(|error| with_columns_to_name(error, renamed))?;
     // Doubts are printed on standard error, so that the output on standard output is unchanged.
-    let tell = |doubt: &dyn Display| warn(format!("stretch: {doubt}"));
+    let tell = |found: &dyn Display| doubt(found);
     if several.is_empty() {
         let named: Vec<_> = one.iter().map(|(name, c)| (name.as_str(), c)).collect();
         let evaluation = evaluate(&named, &trials)?;
@@ -122,19 +122,21 @@ fn array_doubts(
         all.extend(fitted.map(|doubt| doubt.of(name)));
     }
     let specs = || calibrations.iter().map(|(_, own)| own.spec());
-    let (together, alone) = evaluation.pooled.split_at(calibrations.len());
-    for (errors, spec) in together.iter().zip(specs()) {
+    for (method, spec) in specs().enumerate() {
+        let errors = &evaluation.pooled[method];
         let outside = Doubt::of_clamped(errors.clamped, errors.samples);
-        let doubts = Doubt::of_errors(errors, spec.all.sd, &evaluation.unit).chain(outside);
-        all.extend(doubts.map(|doubt| doubt.of(&errors.method)));
+        let doubts = Doubt::of_method(evaluation, method, spec.all.sd, spec.reference.as_str());
+        all.extend(doubts.into_iter().chain(outside).map(|doubt| doubt.of(&errors.method)));
     }
-    let gains = specs().flat_map(|spec| &spec.alone);
-    let shifted = alone.iter().zip(gains).filter(|(errors, gains)| {
-        let mut doubts = Doubt::of_errors(errors, gains.sd, &evaluation.unit);
-        doubts.any(|doubt| doubt.code == SHIFTED)
+    let alone = specs().flat_map(|spec| spec.alone.iter().map(move |gains| (spec, gains.sd)));
+    let shifted = (calibrations.len()..).zip(alone).filter(|(method, (spec, sd))| {
+        let doubts = Doubt::of_method(evaluation, *method, *sd, spec.reference.as_str());
+        doubts.iter().any(|doubt| doubt.code == SHIFTED)
     });
-    let shifted = shifted.map(|(errors, _)| {
-        format!("{} by {} {}", errors.method, number(errors.bias), evaluation.unit)
+    let shifted = shifted.filter_map(|(method, _)| {
+        let errors = evaluation.trials.iter().map(|trial| &trial.methods[method]);
+        let worst = errors.max_by(|a, b| a.bias.abs().total_cmp(&b.bias.abs()))?;
+        Some(format!("{} by {}", worst.method, with_unit(worst.bias, &evaluation.unit)))
     });
     let shifted: Vec<String> = shifted.collect();
     if !shifted.is_empty() {
@@ -142,6 +144,8 @@ fn array_doubts(
             "was a gauge put on again? On average, these estimates differ from the reference: {}; calibrate again",
             shifted.join(", ")
         );
+        // The gauges that have shifted explain the shift of all together.
+        all.retain(|doubt| doubt.code != SHIFTED);
         all.push(Doubt { code: SHIFTED, text });
     }
     all

@@ -87,6 +87,11 @@ pub(crate) fn or_force(error: anyhow::Error) -> anyhow::Error {
     }
 }
 
+/// Returns a number with its unit, or alone if the unit is empty.
+pub(crate) fn with_unit(number: f64, unit: &str) -> String {
+    format!("{} {unit}", crate::table::number(number)).trim_end().to_owned()
+}
+
 /// Adds the names of files to an error that does not contain them.
 pub(crate) fn of_files(error: impl Into<anyhow::Error>, paths: &[PathBuf]) -> anyhow::Error {
     let (error, shown) = (error.into(), |path: &Path| path.display().to_string());

@@ -63,6 +63,7 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
     let later = later.replace('\n', ",1\n").replacen("bridge_v,1", "bridge_v,more", 1);
     let still = rows(&scratch, &|_, [t, _, signal]| Some([t, 74.0, signal]));
     let metres = rows(&scratch, &|_, [t, length, signal]| Some([t, 0.001 * length, signal]));
+    let reversed = rows(&scratch, &|_, [t, length, signal]| Some([t, 180.0 - length, signal]));
     let millivolts = rows(&scratch, &|_, [t, length, signal]| Some([t, length, 1000.0 * signal]));
     let (files, all) = (&[EVALUATE, APPLY], &[EVALUATE, APPLY, STREAM]);
     let (evaluate, applied) = (&[EVALUATE], &[APPLY, STREAM]);
@@ -102,12 +103,21 @@ fn a_log_that_makes_one_doubt_the_estimates_is_told_on_every_way_in() {
         ),
         (
             "metres.csv",
-            metres.clone(),
+            metres,
             evaluate,
-            &["its error is larger than that of a constant, the mean of the reference"],
-            &[],
+            &[
+                "length_mm changes by 0.001 for 1 of the estimate",
+                "--column 'length_mm=length_mm*1000'",
+            ],
+            &["does not belong", "put on again"],
         ),
-        ("metres.csv", metres, evaluate, &["does not belong to that calibration"], &[]),
+        (
+            "reversed.csv",
+            reversed,
+            evaluate,
+            &["cal: the estimate rises while length_mm falls"],
+            &["does not belong", "put on again"],
+        ),
         (
             "millivolts.csv",
             millivolts.clone(),

@@ -42,7 +42,7 @@ type Spoil = fn(&mut Trial);
 
 #[test]
 fn one_trial_that_is_not_like_the_others_is_told_once() {
-    let members: [(&str, Spoil); 9] = [
+    let members: [(&str, Spoil); 12] = [
         ("t1.csv has bridge_v and length_mm exchanged, compared with t0.csv", |t| {
             let (length, signal) = t.channels.split_at_mut(SIGNAL);
             std::mem::swap(&mut length[0].values, &mut signal[0].values);
@@ -58,6 +58,15 @@ fn one_trial_that_is_not_like_the_others_is_told_once() {
         }),
         ("bridge_v of t1.csv is about a thousandth of that of t0.csv", |t| {
             change(t, SIGNAL, |v| 1e-3 * v);
+        }),
+        ("length_mm of t1.csv is about 1/57.3 of that of t0.csv", |t| {
+            change(t, LENGTH, |x| x.to_radians());
+        }),
+        ("length_mm of t1.csv is about 57.3 times that of t0.csv", |t| {
+            change(t, LENGTH, f64::to_degrees);
+        }),
+        ("length_mm of t1.csv is about a thousandth of that of t0.csv", |t| {
+            change(t, LENGTH, |x| 1e-3 * x);
         }),
         ("bridge_v equals length_mm in t1.csv", |t| {
             t.channels[SIGNAL].values = t.channels[LENGTH].values.clone();

@@ -3,7 +3,10 @@
 use stretch_core::{Label, Provenance};
 use stretch_data::{Trial, in_digits};
 
-use crate::{fit::FitReport, prepare::without_gross_errors};
+use crate::{
+    fit::FitReport,
+    prepare::{DEGREES_IN_A_RADIAN, Line, without_gross_errors},
+};
 
 use super::evaluate::MethodErrors;
 
@@ -71,25 +74,35 @@ pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
     })
 }
 
-/// Smallest constant error that is reported, in percent of the range of the reference.
+/// Constant error, in percent of the range of the reference, above which it is always reported.
 const FAR_OFF_PERCENT: f64 = 5.0;
+/// A smaller constant error is reported if it is more than this percentage of the range, and several times the RMSE of
+/// the fit.
+const OFF_PERCENT: f64 = 1.0;
+const SEVERAL: f64 = 5.0;
 
 /// Largest ratio of the RMSE without the mean error to the RMSE of the fit at which the calibration
 /// still holds apart from a shift.
 const ALIKE: f64 = 1.25;
 
-/// Returns a sentence for estimates that are shifted: the mean error is more than a twentieth of the range, and either it
-/// is most of the error, or the calibration is as accurate without it as in its fit.
+/// Returns a sentence for estimates of a trial that are shifted: the mean error is more than a twentieth of the range, or
+/// more than a hundredth and five times the error of the fit, and either it is most of the error, or the calibration is
+/// as accurate without it as in its fit.
 ///
 /// ```text
-/// bias^2 >= rmse^2 / 2,  or  sqrt(rmse^2 - bias^2) <= 1.25 fit < rmse
+/// |bias| > min(0.05 range, max(0.01 range, 5 fit))  and
+/// (bias^2 >= rmse^2 / 2,  or  sqrt(rmse^2 - bias^2) <= 1.25 fit < rmse)
 /// ```
 ///
-/// Here `fit` is the RMSE of the fit, in the unit of the reference. Typical causes are a sensor that was put on again, and a reference in centimetres
-/// with a calibration in millimetres.
-pub(super) fn off_throughout(errors: &MethodErrors, fit_rmse: f64, unit: &str) -> Option<String> {
-    let MethodErrors { bias, rmse, rmse_percent, .. } = *errors;
-    let is_far = rmse_percent * bias.abs() > FAR_OFF_PERCENT * rmse;
+/// Here `fit` is the RMSE of the fit, and `range` the range of the reference, both in the unit of the reference.
+pub(super) fn off_throughout(
+    errors: &MethodErrors,
+    (fit_rmse, range): (f64, f64),
+    unit: &str,
+) -> Option<String> {
+    let MethodErrors { bias, rmse, .. } = *errors;
+    let least = (0.01 * OFF_PERCENT * range).max(SEVERAL * fit_rmse);
+    let is_far = bias.abs() > least.min(0.01 * FAR_OFF_PERCENT * range);
     let unshifted = (rmse * rmse - bias * bias).max(0.0).sqrt();
     let alike = ALIKE * fit_rmse;
     let is_shift = unshifted <= bias.abs() || (unshifted <= alike && alike < rmse);
@@ -98,14 +111,41 @@ pub(super) fn off_throughout(errors: &MethodErrors, fit_rmse: f64, unit: &str) -
         let side = if bias > 0.0 { "above" } else { "below" };
         format!(
             "was the sensor put on again? The estimate is shifted: it is {} {side} the reference on average. Without this shift, the \
-             RMSE would be {} instead of {}. Calibrate again: half a minute of reference is enough with a prior of earlier sessions \
-             (stretch calibrate --prior), and stretch sleeve renew needs no reference. Or is the reference in another unit? If so, \
-             convert it (stretch convert --column 'length_mm=length_cm*10')",
+             RMSE would be {} instead of {}. Calibrate again: half a minute of reference is enough (stretch calibrate --model auto; \
+             several gauges: with a prior of earlier sessions, --prior)",
             with_unit(bias.abs()),
             with_unit(unshifted),
             with_unit(rmse)
         )
     })
+}
+
+/// Factors between units of a reference: decimal prefixes, and degrees in a radian.
+const FACTORS: [f64; 4] = [10.0, 100.0, 1000.0, DEGREES_IN_A_RADIAN];
+
+/// Returns a sentence for a trial whose reference runs against the estimates, or is in another unit: `line` is the line
+/// through estimates and reference, whose slope is about 1 otherwise.
+pub(super) fn other_reference(line: &Line, reference: &str) -> Option<String> {
+    if !line.is_clear() {
+        return None;
+    }
+    let slope = line.slope();
+    if slope < 0.0 {
+        return Some(format!(
+            "the estimate rises while {reference} falls: is {reference} (such as 180 minus the angle), or the signal, reversed? Convert \
+             it with stretch convert --column '{reference}={reference}*-1+180', with its own offset"
+        ));
+    }
+    let factors = FACTORS.into_iter().flat_map(|factor| [factor, 1.0 / factor]);
+    let factor = factors.into_iter().find(|factor| (slope * factor - 1.0).abs() < 0.2)?;
+    let is_angle = [factor, 1.0 / factor].contains(&DEGREES_IN_A_RADIAN);
+    let example = if is_angle { ", such as radians and degrees" } else { "" };
+    Some(format!(
+        "{reference} changes by {} for 1 of the estimate: are they in different units{example}? Convert it with stretch convert \
+         --column '{reference}={reference}*{}'",
+        in_digits(slope, 4),
+        in_digits(factor, 6)
+    ))
 }
 
 /// Returns a sentence if the reference is constant, because R^2 is then undefined.

@@ -8,18 +8,21 @@ use stretch_data::{Trial, out_of_order, rate_of};
 use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::{
-    acceptance::{beside_a_constant, fitted_on, not_its_own, off_throughout, worse_than_the_mean},
+    acceptance::{
+        beside_a_constant, fitted_on, not_its_own, off_throughout, other_reference,
+        worse_than_the_mean,
+    },
     apply::{Applied, at_rate},
-    evaluate::{Evaluation, MethodErrors},
+    evaluate::Evaluation,
     reach::Reach,
 };
-use crate::error::PACE_TOLERANCE;
+use crate::{error::PACE_TOLERANCE, prepare::Line};
 
 /// A doubt about a result. `Display` writes its text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Doubt {
     /// Stable code for programs: `other_rate`, `constant_signal`, `other_unit`, `outside_range`, `fitted_trials`,
-    /// `constant_error`, `worse_than_the_mean` or `constant_reference`.
+    /// `other_reference`, `constant_error`, `worse_than_the_mean` or `constant_reference`.
     pub code: &'static str,
     /// A sentence for users that includes advice.
     pub text: String,
@@ -45,19 +48,41 @@ impl Doubt {
         fitted_on(provenance, columns, trials).map(|text| Self::new("fitted_trials", text))
     }
 
-    /// Returns doubts about the errors of a method: a shift, or errors that say nothing. `fit_rmse` is the RMSE of its
-    /// fit, in the unit of the reference.
-    pub fn of_errors(
-        errors: &MethodErrors,
+    /// Returns doubts about a method of an evaluation, by its place in it: trials whose reference is in another unit or
+    /// reversed, trials whose estimates are shifted, and errors that say nothing. Doubts about a trial name it if there
+    /// are several. `fit_rmse` is the RMSE of the method's fit, in the unit of the reference, and `reference` the name of
+    /// that column.
+    pub fn of_method(
+        evaluation: &Evaluation,
+        method: usize,
         fit_rmse: f64,
-        unit: &str,
-    ) -> impl Iterator<Item = Self> {
-        let words = [
-            ("constant_error", off_throughout(errors, fit_rmse, unit)),
-            ("worse_than_the_mean", worse_than_the_mean(errors)),
-            ("constant_reference", beside_a_constant(errors)),
-        ];
-        words.into_iter().filter_map(|(code, text)| Some(Self::new(code, text?)))
+        reference: &str,
+    ) -> Vec<Self> {
+        let Evaluation { unit, trials, pooled, .. } = evaluation;
+        let pooled = &pooled[method];
+        let range = 100.0 * pooled.rmse / pooled.rmse_percent;
+        let mut all: Vec<Self> = Vec::new();
+        for trial in trials {
+            let pairs =
+                trial.estimates[method].iter().copied().zip(trial.reference.iter().copied());
+            let line = Line::through(pairs.filter(|(estimate, _)| estimate.is_finite()));
+            let found = other_reference(&line, reference).map(|text| ("other_reference", text));
+            let shift = || off_throughout(&trial.methods[method], (fit_rmse, range), unit);
+            let found = found.or_else(|| shift().map(|text| ("constant_error", text)));
+            let Some((code, text)) = found else { continue };
+            match all.iter_mut().find(|doubt| doubt.code == code) {
+                Some(first) => first.text = format!("{}; also {}", first.text, trial.trial),
+                None if trials.len() == 1 => all.push(Self::new(code, text)),
+                None => all.push(Self::new(code, text).of(&trial.trial)),
+            }
+        }
+        if !all.iter().any(|doubt| doubt.code == "other_reference") {
+            all.extend(
+                worse_than_the_mean(pooled).map(|text| Self::new("worse_than_the_mean", text)),
+            );
+        }
+        all.extend(beside_a_constant(pooled).map(|text| Self::new("constant_reference", text)));
+        all
     }
 
     /// Prefixes the text with the name of a trial or a method.
@@ -94,7 +119,9 @@ pub struct Seen {
     pub samples: u64,
     /// Samples without an estimate.
     pub withheld: u64,
-    /// Samples outside the calibrated domain: see [`MethodErrors::clamped`](crate::MethodErrors::clamped).
+    /// Samples with a clamped signal or rate of change: the signal is beyond the ends of the model's curve.
+    pub limited: u64,
+    /// Those of them outside the calibrated domain: see [`MethodErrors::clamped`](crate::MethodErrors::clamped).
     pub clamped: u64,
     range: Range<f64>,
     reach: Reach,
@@ -106,7 +133,7 @@ impl Seen {
     pub fn of(calibration: &Calibration) -> Self {
         let (reach, pace) = (Reach::of(calibration), Pace::of(calibration));
         let range = calibration.spec().signal_range;
-        Self { samples: 0, withheld: 0, clamped: 0, range, reach, pace }
+        Self { samples: 0, withheld: 0, limited: 0, clamped: 0, range, reach, pace }
     }
 
     /// Counts a sample with its time in seconds and its reading. Returns a doubt, at most once, if samples come at
@@ -120,7 +147,12 @@ impl Seen {
         self.samples += 1;
         self.reach.take(signal);
         match reading {
-            Ok(reading) => self.clamped += u64::from(is_outside(&self.range, signal, reading)),
+            Ok(reading) => {
+                let is_limited =
+                    !matches!(reading.domain, Domain::Inside | Domain::EstimateClamped);
+                self.limited += u64::from(is_limited);
+                self.clamped += u64::from(is_outside(&self.range, signal, reading));
+            }
             Err(_) => self.withheld += 1,
         }
         self.pace.take(time_s)
@@ -188,19 +220,21 @@ pub fn evaluation_doubts(
         all.extend(paces.chain(fitted).map(|doubt| doubt.of(name)));
     }
     // The first method is the raw signal.
-    for (errors, (name, calibration)) in evaluation.pooled.iter().skip(1).zip(calibrations) {
+    for (method, (name, calibration)) in (1..).zip(calibrations) {
+        let errors = &evaluation.pooled[method];
         let mut reach = Reach::of(calibration);
         let signal = calibration.spec().signal.as_str();
         let signals = trials.iter().filter_map(|trial| trial.channel(signal));
         signals.flatten().for_each(|value| reach.take(*value));
         let spec = calibration.spec();
         let unit = spec.target.reference_per_normalised(spec.target_range).abs();
-        let said = Doubt::of_errors(errors, unit * spec.model.fit_rmse(), &evaluation.unit);
+        let fit_rmse = unit * spec.model.fit_rmse();
+        let said = Doubt::of_method(evaluation, method, fit_rmse, spec.reference.as_str());
         let outside = outside(&reach, errors.clamped, errors.samples);
         match outside {
             Some(cause) if cause.explains_others() => all.push(cause.of(name)),
             // A shift comes first, because it also puts samples outside the range.
-            outside => all.extend(said.chain(outside).map(|doubt| doubt.of(name))),
+            outside => all.extend(said.into_iter().chain(outside).map(|doubt| doubt.of(name))),
         }
     }
     all

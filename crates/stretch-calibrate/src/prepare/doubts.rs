@@ -34,7 +34,10 @@ const NEXT: usize = 8;
 /// mistake.
 type Mistake = (fn(Line, Line) -> [Line; 2], &'static str);
 
-const MISTAKES: [Mistake; 4] = [
+/// Degrees in a radian.
+pub(crate) const DEGREES_IN_A_RADIAN: f64 = 180.0 / std::f64::consts::PI;
+
+const MISTAKES: [Mistake; 8] = [
     (
         |own, _| [own, Line { means: swap(own.means), spreads: swap(own.spreads), ..own }],
         "{trial} has {signal} and {reference} exchanged, compared with {other}: swap the two column names with stretch convert, or leave the trial out",
@@ -49,20 +52,40 @@ const MISTAKES: [Mistake; 4] = [
          or leave the trial out",
     ),
     (
-        |own, _| [own, own.times(1e-3)],
+        |own, _| [own, own.times([1e-3, 1.0])],
         "{signal} of {trial} is about 1000 times that of {other}: is one in millivolts and the other in volts? Convert one with \
          stretch convert --column '{signal}={signal}/1000'",
     ),
     (
-        |own, _| [own, own.times(1e3)],
+        |own, _| [own, own.times([1e3, 1.0])],
         "{signal} of {trial} is about a thousandth of that of {other}: is one in volts and the other in millivolts? Convert one with \
          stretch convert --column '{signal}={signal}*1000'",
+    ),
+    (
+        |own, _| [own, own.times([1.0, 1e-3])],
+        "{reference} of {trial} is about 1000 times that of {other}: are they in different units? Convert one with stretch convert \
+         --column '{reference}={reference}/1000'",
+    ),
+    (
+        |own, _| [own, own.times([1.0, 1e3])],
+        "{reference} of {trial} is about a thousandth of that of {other}: are they in different units? Convert one with stretch convert \
+         --column '{reference}={reference}*1000'",
+    ),
+    (
+        |own, _| [own, own.times([1.0, 1.0 / DEGREES_IN_A_RADIAN])],
+        "{reference} of {trial} is about 57.3 times that of {other}: is one in degrees and the other in radians? Convert one with \
+         stretch convert --column '{reference}={reference}*0.0174533'",
+    ),
+    (
+        |own, _| [own, own.times([1.0, DEGREES_IN_A_RADIAN])],
+        "{reference} of {trial} is about 1/57.3 of that of {other}: is one in radians and the other in degrees? Convert one with \
+         stretch convert --column '{reference}={reference}*57.2958'",
     ),
 ];
 
 /// The least-squares line through signal and reference, with the standard deviations of both.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Line {
+pub(crate) struct Line {
     /// Means of signal and reference.
     pub(super) means: [f64; 2],
     /// Standard deviations of signal and reference.
@@ -75,6 +98,11 @@ impl Line {
     /// Returns the line of a trial's parts.
     pub(super) fn of<'a>(parts: impl Iterator<Item = &'a Piece> + Clone) -> Self {
         let pairs = parts.flat_map(|(_, [signal, reference, _])| signal.iter().zip(reference));
+        Self::through(pairs.map(|(signal, reference)| (*signal, *reference)))
+    }
+
+    /// Returns the line through pairs of signal and reference.
+    pub(crate) fn through(pairs: impl Iterator<Item = (f64, f64)> + Clone) -> Self {
         let count = pairs.clone().count().max(1) as f64;
         let [v, x] = pairs.clone().fold([0.0; 2], |[v, x], (a, b)| [v + a, x + b]);
         let means = [v / count, x / count];
@@ -93,11 +121,12 @@ impl Line {
         }
     }
 
-    fn is_clear(&self) -> bool {
+    /// Whether the line explains at least half of the variance.
+    pub(crate) fn is_clear(&self) -> bool {
         self.correlation.powi(2) >= HAS_LINE
     }
 
-    fn slope(&self) -> f64 {
+    pub(crate) fn slope(&self) -> f64 {
         let slope = self.correlation * self.spreads[1] / self.spreads[0];
         if slope.is_finite() { slope } else { 0.0 }
     }
@@ -107,9 +136,9 @@ impl Line {
         self.means[1] + self.slope() * (signal - self.means[0])
     }
 
-    fn times(self, factor: f64) -> Self {
-        let [means, spreads] =
-            [self.means, self.spreads].map(|[signal, reference]| [factor * signal, reference]);
+    fn times(self, [of_signal, of_reference]: [f64; 2]) -> Self {
+        let [means, spreads] = [self.means, self.spreads]
+            .map(|[signal, reference]| [of_signal * signal, of_reference * reference]);
         Self { means, spreads, ..self }
     }
 

@@ -130,6 +130,11 @@ pub(crate) fn instead(error: &clap::Error) -> Option<String> {
         _ => return None,
     };
     let Some(ContextValue::String(name)) = error.get(kind) else { return None };
+    if name.ends_with(".csv") && error.kind() == ErrorKind::UnknownArgument {
+        return Some(format!(
+            "{name}: one file was already named; name the calibration with --calibration cal.json"
+        ));
+    }
     let name = name.split(['=', ' ']).next()?;
     let (_, instead) = table.iter().find(|(old, _)| *old == name)?;
     Some(format!("{name}: {instead}"))
@@ -154,6 +159,9 @@ mod tests {
             let error = command().try_get_matches_from(asked).unwrap_err();
             assert_eq!(instead(&error), Some(format!("{name}: {text}")));
         }
+        let asked = ["stretch", "apply", "--calibration", "a.json", "b.csv", "c.csv"];
+        let error = command().try_get_matches_from(asked).unwrap_err();
+        assert!(instead(&error).is_some_and(|text| text.contains("--calibration")), "{error}");
     }
 
     #[test]

@@ -375,7 +375,7 @@ fn priors_refuse_what_they_have_not_seen() {
             |row| (row[0], row[1]) = (1.0 - row[0], 1.0 - row[1]),
             &["swap the wires"],
         ),
-        ("copies.csv", SHORT, |row| row[1] = row[0], &["copies", "--signal"]),
+        ("copies.csv", SHORT, |row| row[1] = row[0], &["the same signal", "--signal"]),
     ];
     for (name, worn, change, says) in cases {
         scratch.worn(name, worn, change);

@@ -7,12 +7,14 @@ use serde_json::json;
 use stretch_data::Split;
 use stretch_data::files::Outputs;
 use stretch_recording::ReadOptions;
-use stretch_sleeve::{Assumed, Expected, Prior, RenewOptions, Renewed, Session, SleeveCalibration};
+use stretch_sleeve::{
+    Assumed, Expected, Prior, RenewOptions, Renewed, Session, SleeveCalibration, SleeveError,
+};
 
 use super::{
     json::Json,
     reading::{read_trials, with_columns_to_name},
-    shared::{give_stdout, of_files, say, tell, write_text},
+    shared::{give_stdout, of_files, say, tell, with_unit, write_text},
 };
 use crate::{
     display::warn,
@@ -76,6 +78,11 @@ fn learn(args: LearnArgs) -> anyhow::Result<()> {
     tell(format!("wrote {}", args.out.display()))
 }
 
+/// Returns the head of a column with its unit, which may be empty.
+fn labelled(name: &str, unit: &str) -> String {
+    format!("{name} {unit}").trim_end().to_owned()
+}
+
 fn print_prior(prior: &Prior) -> anyhow::Result<()> {
     let unit = prior.unit();
     say(format!(
@@ -85,8 +92,8 @@ fn print_prior(prior: &Prior) -> anyhow::Result<()> {
     ))?;
     let header = [
         "reference, s",
-        &format!("RMSE {unit}, known sensor"),
-        &format!("RMSE {unit}, new sensor"),
+        &format!("{}, known sensor", labelled("RMSE", &unit)),
+        &format!("{}, new sensor", labelled("RMSE", &unit)),
     ];
     let row = |e: &Expected| vec![number(e.seconds), maybe(e.rmse_known), maybe(e.rmse_new)];
     say(table(&header, prior.expected.iter().map(row)))
@@ -134,7 +141,10 @@ fn renew(args: RenewArgs) -> anyhow::Result<()> {
     let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
     let options =
         RenewOptions { signals: signals.clone(), calibration, ..RenewOptions::of(&args.of) };
-    let renewed = prior.renew(&trials, &options).map_err(|e| of_files(e, &args.trials))?;
+    let renewed = prior.renew(&trials, &options).map_err(|error| match &args.calibration {
+        Some(path) if matches!(error, SleeveError::OtherPrior) => of_files(error, &[path.clone()]),
+        _ => of_files(error, &args.trials),
+    })?;
     let mut outputs = Outputs::default();
     let record = renewed.calibration.bytes(&args.out)?;
     outputs.file(&args.out, |out| out.write_all(&record))?;
@@ -151,19 +161,19 @@ fn print_renewal(renewed: &Renewed, unit: &str) -> anyhow::Result<()> {
     say(
         "Without a reference, the ends and the rest of the movement are assumed to be those of earlier sessions:",
     )?;
-    let header = ["", &format!("assumed {unit}"), "sd", "sessions", "before", "after"];
+    let header = ["", &labelled("assumed", unit), "sd", "sessions", "before", "after"];
     let row = |a: &Assumed| {
         let [value, sd, before, after] = [a.reference, a.sd, a.before, a.after].map(number);
         vec![a.landmark.clone(), value, sd, a.sessions.to_string(), before, after]
     };
     say(table(&header, summary.assumed.iter().map(row)))?;
     say(format!(
-        "the estimate is shifted by {} {unit} and scaled by {:.3}; its error cannot be estimated without a reference{}",
-        number(summary.shift),
+        "the estimate is shifted by {} and scaled by {:.3}; its error cannot be estimated without a reference{}",
+        with_unit(summary.shift, unit),
         summary.scale,
         summary.prior_rmse.map_or(String::new(), |rmse| format!(
-            ": without this renewal, earlier sessions that were left out were off by {} {unit} (RMSE)",
-            number(rmse)
+            ": without this renewal, earlier sessions that were left out were off by {} (RMSE)",
+            with_unit(rmse, unit)
         ))
     ))?;
     renewed.notes.iter().for_each(|note| warn(format!("note: {note}")));

@@ -17,9 +17,13 @@ pub enum CalibrateError {
     NoTrials,
     /// No model can be evaluated on samples that were left out of its fit.
     #[error(
-        "there are too few samples to leave some out of the fit, so that the models cannot be compared; record a minute of motion, or choose one model with --model"
+        "{samples} samples are too few to compare models, because parts of them and 2 s on either side of each part are left out of the fit: \
+         record a minute of motion, or choose one model with --model"
     )]
-    TooFewToJudge,
+    TooFewToJudge {
+        /// Number of samples of all trials.
+        samples: usize,
+    },
     /// The trial has too few samples.
     #[error("{trial}: {samples} samples are too few to calibrate on; record a minute of motion")]
     TooShort {
@@ -150,7 +154,7 @@ pub enum CalibrateError {
     },
     /// The converter has too many bits for 32-bit integer arithmetic.
     #[error(
-        "codes of a converter of {bits} bits are too large for 32-bit integers: export in float (stretch export --c DIR --form float), or \
+        "codes of a converter of {bits} bits are too large for 32-bit integers: \
          give the board the upper 16 bits of each code (--adc 16,ZERO,FULL_SCALE)"
     )]
     FixedBits {

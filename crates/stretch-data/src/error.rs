@@ -3,7 +3,7 @@
 
 use std::{fmt, fs, io, path::Path};
 
-use crate::files::FileError;
+use crate::{column::unit, files::FileError};
 
 /// A place in a file.
 ///
@@ -43,7 +43,7 @@ pub enum DataError {
         hint: String,
     },
     /// A required column that is missing.
-    #[error("{file}: there is no column {column}{}; the columns are {}", Nearest(.nearest), .present.join(", "))]
+    #[error("{file}: there is no column {column}{}; the columns are {}", Nearest(.nearest, .column), .present.join(", "))]
     MissingColumn {
         /// The file.
         file: String,
@@ -152,11 +152,15 @@ pub enum DataError {
     },
 }
 
-struct Nearest<'a>(&'a Option<String>);
+struct Nearest<'a>(&'a Option<String>, &'a str);
 
 impl fmt::Display for Nearest<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
+            // A time column is renamed when it is read.
+            _ if matches!(unit(self.1), Some("s" | "ms" | "us" | "ns")) => {
+                f.write_str(" (the time of a recording is named time_s after reading)")
+            }
             Some(name) => write!(f, " (did you mean {name}?)"),
             None => Ok(()),
         }

@@ -102,9 +102,7 @@ impl Format {
             #[cfg(not(feature = "parquet"))]
             Self::Parquet => Err(RecordingError::convert(file, "a Parquet file", "parquet")),
             Self::Python(format, extra) => Err(RecordingError::convert(file, format, extra)),
-            Self::Foreign(format, todo) => {
-                Err(refused(format, format!("this format is not supported; {todo}")))
-            }
+            Self::Foreign(format, todo) => Err(refused(format, todo.to_owned())),
             Self::Text | Self::Gzip => Err(refused("text", "it holds no arrays".to_owned())),
         }
     }

@@ -128,7 +128,7 @@ pub fn choose_model_watched(
     choose_among(trials, options, judged).ok_or_else(|| {
         // A part without samples gives the error that there is no trial, which would mislead a user who named trials.
         let first = first.filter(|problem| !matches!(problem, CalibrateError::NoTrials));
-        first.unwrap_or(CalibrateError::TooFewToJudge)
+        first.unwrap_or(CalibrateError::TooFewToJudge { samples: rows })
     })
 }
 
@@ -263,10 +263,9 @@ fn notes(trials: &[Trial], options: &Options, memory_shows: bool) -> Vec<String>
     }
     if trials.len() < LEAST_TRIALS {
         notes.push(format!(
-            "{} {} left out in {PARTS} parts each, which cannot show a drift between sessions; \
-             from {LEAST_TRIALS} trials on, whole trials are left out",
-            trials.len(),
-            if trials.len() == 1 { "trial was" } else { "trials were" }
+            "the models were compared on {PARTS} parts of {}, each left out of the fit in turn; this does not show a drift between \
+             sessions, and with {LEAST_TRIALS} trials or more, whole trials are left out instead",
+            if trials.len() == 1 { "the trial" } else { "each trial" }
         ));
     }
     notes

@@ -58,7 +58,7 @@ pub(crate) fn read_archive(
     };
     // The names of the members are not compressed, so they can also be read in a broken archive.
     if let Some((format, todo)) = foreign(&bytes) {
-        let problem = format!("this format is not supported; {todo}");
+        let problem = todo.to_owned();
         return Err(RecordingError::Format { file: file.to_owned(), format, problem });
     }
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;

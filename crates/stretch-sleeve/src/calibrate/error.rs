@@ -16,9 +16,10 @@ pub enum SleeveError {
         /// Largest possible number.
         most: usize,
     },
-    /// Two channels are identical.
+    /// Two channels are identical, or one is a line of the other.
     #[error(
-        "{first} and {second} are copies of one another, and a copy adds nothing: leave one of them out of --signal"
+        "{first} and {second} are the same signal, apart from a factor and an offset, and the second adds nothing: leave one of \
+         them out of --signal"
     )]
     Copies {
         /// The first.
@@ -26,6 +27,11 @@ pub enum SleeveError {
         /// The second.
         second: String,
     },
+    /// A calibration to renew was not made from the prior.
+    #[error(
+        "this calibration was not made from this prior: make one with stretch calibrate --prior, or give --of WEARER instead"
+    )]
+    OtherPrior,
     /// A prior or a session of a prior cannot be used with these data.
     #[error("{file}: {problem}")]
     Prior {

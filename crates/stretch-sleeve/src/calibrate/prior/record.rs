@@ -80,7 +80,14 @@ fn opened<T: for<'d> Deserialize<'d>>(
     let bytes = read_whole(path).map_err(|error| unusable(&error))?;
     let text = String::from_utf8(bytes).map_err(|error| unusable(&error))?;
     let object = digest::verified(&text, "an unchanged copy can still be used");
-    let value = digest::parse(&object.map_err(|error| unusable(&error))?);
+    let object = object.map_err(|error| unusable(&error))?;
+    if ["\"signal\":", "\"channels\":"].iter().any(|key| object.contains(key)) {
+        return Err(SleeveError::Prior {
+            problem: format!("this is a calibration, not a {}; {}", what[0], what[1]),
+            file,
+        });
+    }
+    let value = digest::parse(&object);
     Ok((value.map_err(|error| unusable(&error))?, file))
 }
 

@@ -179,12 +179,7 @@ impl Prior {
         let (normal, known) = self.of(&options.path);
         let Some(calibration) = &options.calibration else { return Ok((normal, known)) };
         let linear = self.linear(&normal.mean, self.gram.clone(), self.noise);
-        let weights = linear.weights_of(calibration).ok_or_else(|| SleeveError::Prior {
-            file: "the calibration".into(),
-            problem: "it was not made from this prior: make one with stretch calibrate --prior, or give --of WEARER \
-                      instead"
-                .into(),
-        })?;
+        let weights = linear.weights_of(calibration).ok_or(SleeveError::OtherPrior)?;
         // Both the earlier and the new session differ from the mean of their wearer, each with the variance of a
         // session.
         let covariance = self.levels.last().map_or(normal.covariance, |level| level * 2.0);

@@ -212,6 +212,12 @@ fn a_prior_and_a_session_are_what_they_were_after_writing_and_reading() {
     let session = summed(0, 0, &["s1"]);
     std::fs::write(&path, session.to_json().unwrap()).unwrap();
     assert_eq!(Session::read(&path).unwrap(), session);
+    std::fs::write(&path, update(&own).bytes(&path).unwrap()).unwrap();
+    let errors = [Prior::read(&path).map(drop), Session::read(&path).map(drop)];
+    for (error, what) in errors.into_iter().zip(["prior", "session"]) {
+        let error = error.unwrap_err().to_string();
+        assert!(error.contains(&format!("this is a calibration, not a {what}")), "{error}");
+    }
 }
 
 #[test]
@@ -304,7 +310,7 @@ fn channels_together_err_less_than_the_best_and_a_lost_one_is_bearable() {
         trial
     };
     let error = calibrate_array(&[copied], &options).unwrap_err().to_string();
-    assert!(error.contains("s1 and s2 are copies"), "{error}");
+    assert!(error.contains("s1 and s2 are the same signal"), "{error}");
 }
 
 #[test]

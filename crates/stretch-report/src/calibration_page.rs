@@ -84,7 +84,7 @@ pub fn readme_picture(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluatio
     first.map_or_else(String::new, |trial| closest_look(evaluation, trial, &names).standalone())
 }
 
-/// Returns one sentence with the error of the best calibration.
+/// Returns one sentence with the error of the last calibration, which is the chosen one.
 pub fn calibration_verdict(judged: &Judged<'_>) -> String {
     let Judged { calibrated, evaluation, context } = *judged;
     let names = method_names(calibrated, evaluation);
@@ -96,7 +96,14 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
         }
         (method, _) => method.to_owned(),
     };
-    let Some(errors) = errors_in_words(methods, &evaluation.unit, called) else {
+    // The chosen calibration alone: another one may be better on these recordings by chance.
+    let chosen = calibrated.last().and_then(|(name, _)| {
+        let at = methods.iter().position(|m| m.method == *name)?;
+        let raw = methods.iter().filter(|m| m.method == RAW);
+        let two: Vec<MethodErrors> = raw.chain([&methods[at]]).cloned().collect();
+        errors_in_words(&two, &evaluation.unit, |_| called(at))
+    });
+    let Some(errors) = chosen else {
         return "No estimate could be compared with a reference.".to_owned();
     };
     let judged = &evaluation.trials;
@@ -120,7 +127,9 @@ pub fn errors_in_words(
     let best = best(methods)?;
     let off = |m: &MethodErrors| with_unit(&number(m.rmse, 3), unit);
     let raw = methods.iter().find(|m| m.method == RAW);
-    let raw = raw.map_or_else(String::new, |m| format!("; the raw signal by {}", off(m)));
+    let raw = raw.map_or_else(String::new, |m| {
+        format!("; the raw signal, scaled to the reference, by {}", off(m))
+    });
     let percent = number(methods[best].rmse_percent, 2);
     let is_off = format!("{} is off by {}", name(best), off(&methods[best]));
     Some(format!("{is_off} (RMSE, {percent}\u{a0}% of the range){raw}."))
@@ -137,7 +146,10 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
             recordings(&context.tested_on)
         }
     ));
-    let caption = "All test recordings together";
+    let caption = match context.tested_on.is_empty() {
+        true => "All recordings of the fit together",
+        false => "All test recordings together",
+    };
     page.table(&method_table(caption, &evaluation.pooled, names, &evaluation.unit));
     if !context.kinds.is_empty() {
         // folded, because each of these tables fills four screens of a phone

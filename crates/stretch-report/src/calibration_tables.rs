@@ -62,12 +62,14 @@ pub fn method_table(
     ];
     let row = |(m, name): (&MethodErrors, &String)| {
         let outside = 100.0 * m.clamped as f64 / (m.samples.max(1)) as f64;
+        // The mean error of a least-squares fit is a rounding error.
+        let bias = if m.bias.abs() < 1e-9 * m.rmse { 0.0 } else { m.bias };
         vec![
             name.clone(),
             fixed(m.average_error_percent, 2),
             number(m.rmse, 3),
             fixed(m.rmse_percent, 2),
-            number(m.bias, 3),
+            number(bias, 3),
             fixed(m.r_squared, 3),
             m.lag_s.map_or_else(|| NONE.to_owned(), |lag| fixed(1e3 * lag, 0)),
             number(m.max, 3),

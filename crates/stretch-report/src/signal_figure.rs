@@ -46,13 +46,14 @@ pub(crate) fn signal_figure(
         format!("Reference against {signal}, by direction, with the estimates of {name}");
     let draw = |area: &super::figure::Area<'_>| {
         plot(area, &axes, |chart| {
-            for (points, ink) in [(&rising, Ink::Low), (&falling, Ink::High)] {
-                let dots = sample(points, DOTS).into_iter();
-                chart.draw_series(dots.map(|at| Circle::new(at, px(1.0), dot(ink, 0.6))))?;
-            }
+            // The dots come last, because the line would cover a narrow loop.
             for run in &estimates {
                 let points = sample_in_order(run, POINTS);
-                chart.draw_series(LineSeries::new(points, stroke(Ink::of(method).color(), 1.6)))?;
+                chart.draw_series(LineSeries::new(points, stroke(Ink::of(method).color(), 1.0)))?;
+            }
+            for (points, ink) in [(&rising, Ink::Low), (&falling, Ink::High)] {
+                let dots = sample(points, DOTS).into_iter();
+                chart.draw_series(dots.map(|at| Circle::new(at, px(1.5), dot(ink, 0.8))))?;
             }
             Ok(())
         })

@@ -203,8 +203,8 @@ fn the_first_sentence_says_what_the_numbers_say() {
     assert_eq!(
         sentence(&made.page(&context("tuesday"))),
         format!(
-            "On a recording that was not used for the fit, poly13 is off by {} (RMSE, {}\u{a0}% of the range); the raw signal \
-             by {}.",
+            "On a recording that was not used for the fit, poly13 is off by {} (RMSE, {}\u{a0}% of the range); the raw signal, \
+             scaled to the reference, by {}.",
             deg(poly13),
             number(poly13.rmse_percent, 2),
             deg(raw)

@@ -71,7 +71,10 @@ impl Sessions {
         let usual = || REFERENCES.into_iter().find(|name| has(name));
         let named = || columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
         let Some(reference) = reference.or_else(usual).filter(|name| has(name)) else {
-            bail!("{name}: name the reference with --reference; the columns are {}", named());
+            bail!(
+                "--data: name the reference of the sessions {name} with --reference; its columns are {}",
+                named()
+            );
         };
         let signals: Vec<String> = match signal {
             Some(signal) => vec![signal.to_owned()],

@@ -14,7 +14,7 @@ use stretch_export::{
     File, Form, HEADER, Header, Options, SELF_TEST_SAMPLES, arduino_library, array_header,
     gauge_header,
 };
-use stretch_receptor::code::Adc;
+use stretch_receptor::code::{Adc, AdcSpec};
 use stretch_sleeve::{RecordSummary, SleeveCalibration, describe_record, seal_record};
 
 use super::shared::{Completed, give_stdout, say, tell};
@@ -112,7 +112,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             SleeveCalibration::Many(several) => array_header(several, &options),
         };
         let made = made.with_context(named)?;
-        let files = stage(&mut outputs, out, &made, args.arduino).with_context(named)?;
+        let files = stage(&mut outputs, out, &made, args.arduino)?;
         anyhow::Ok((out, made, files))
     });
     let c = c.transpose()?;
@@ -189,7 +189,7 @@ fn stage(
     });
     written.map_err(|error| match error {
         FileError::Exists { path } => {
-            anyhow!("{path}: it exists and is not empty; name a new or an empty folder, because nothing is overwritten")
+            anyhow!("{path}: this folder exists and is not empty; name a new or an empty folder, because nothing is overwritten")
         }
         other => other.into(),
     })?;
@@ -197,8 +197,11 @@ fn stage(
 }
 
 fn explain(out: &Path, made: &Header, files: &[File]) -> anyhow::Result<()> {
-    let (out, Header { form, model, pressure, step, .. }) = (out.display(), made);
-    let step = step.as_ref().map_or_else(String::new, |step| format!(", in steps of {step}"));
+    let (out, Header { form, model, pressure, step, adc, .. }) = (out.display(), made);
+    let AdcSpec { bits, zero_v, full_scale_v } = adc.spec();
+    let step = step.as_ref().map_or_else(String::new, |step| {
+        format!(", in steps of {step}, for codes of --adc {bits},{zero_v},{full_scale_v}")
+    });
     tell(format!(
         "wrote {out}: {model}, {form}{step}, a self-test of {SELF_TEST_SAMPLES} samples"
     ))?;

@@ -309,6 +309,9 @@ fn assembled(
     let has_branches = !has.contains(&"array");
     let mut text = opening(&source, form, &model, &has) + &frame(&source, options);
     text += "\n";
+    if !step.iter().any(|part| part.contains("STRETCH_CAN_LOAD")) {
+        text += include_str!("c/no_load.h");
+    }
     text += include_str!("c/flash.h");
     text += "\n/* ---- the calibration ---- */\n\n";
     text += &constants.into_text();

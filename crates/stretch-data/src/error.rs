@@ -43,7 +43,7 @@ pub enum DataError {
         hint: String,
     },
     /// A required column that is missing.
-    #[error("{file}: there is no column {column}{}; the columns are {}", Nearest(.nearest, .column), .present.join(", "))]
+    #[error("{file}: there is no column {column}{}; the columns are {}", Nearest(.nearest, .column, .present), .present.join(", "))]
     MissingColumn {
         /// The file.
         file: String,
@@ -152,13 +152,15 @@ pub enum DataError {
     },
 }
 
-struct Nearest<'a>(&'a Option<String>, &'a str);
+struct Nearest<'a>(&'a Option<String>, &'a str, &'a [String]);
 
 impl fmt::Display for Nearest<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             // A time column is renamed when it is read.
-            _ if matches!(unit(self.1), Some("s" | "ms" | "us" | "ns")) => {
+            _ if matches!(unit(self.1), Some("s" | "ms" | "us" | "ns"))
+                && self.2.iter().any(|name| name == "time_s") =>
+            {
                 f.write_str(" (the time of a recording is named time_s after reading)")
             }
             Some(name) => write!(f, " (did you mean {name}?)"),

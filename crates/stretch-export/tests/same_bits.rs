@@ -309,6 +309,22 @@ fn with_avr_gcc_a_loaded_record_gives_the_same_bits() {
     });
 }
 
+/// A header that cannot load a calibration does not compile as one that can.
+#[test]
+fn a_header_that_cannot_load_is_refused() {
+    for (calibration, form) in [
+        (example_observer(), Form::Fixed),
+        (example_observer(), Form::Float),
+        (stretch_receptor::example_calibration(), Form::Float),
+    ] {
+        let made = header(&calibration, &Options { form: Some(form), adc: adc() }).unwrap();
+        assert!(made.text.contains("#error \"STRETCH_CAN_LOAD: "), "{form}");
+    }
+    let options = Options { form: Some(Form::Fixed), adc: adc() };
+    let made = header(&stretch_receptor::example_calibration(), &options).unwrap();
+    assert!(!made.text.contains("#error \"STRETCH_CAN_LOAD: "));
+}
+
 fn loaded(compilers: &[Compiler], answers: impl Fn(&Path, &Compiler, &str) -> String) {
     for (own, other, refused) in loads() {
         let folder = tempfile::tempdir().unwrap();

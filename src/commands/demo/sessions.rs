@@ -72,7 +72,7 @@ impl Sessions {
         let named = || columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
         let Some(reference) = reference.or_else(usual).filter(|name| has(name)) else {
             bail!(
-                "--data: name the reference of the sessions {name} with --reference; its columns are {}",
+                "--data: name the reference with --reference; the columns of the sessions {name} are {}",
                 named()
             );
         };

@@ -154,7 +154,7 @@ pub enum CalibrateError {
     },
     /// The converter has too many bits for 32-bit integer arithmetic.
     #[error(
-        "codes of a converter of {bits} bits are too large for 32-bit integers: \
+        "codes of a converter of {bits} bits are too large for 32-bit integers: export in float (stretch export --c DIR --form float), or \
          give the board the upper 16 bits of each code (--adc 16,ZERO,FULL_SCALE)"
     )]
     FixedBits {

@@ -5,11 +5,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use stretch_calibrate::{Applied, Doubt, Faults, Seen, pressure_column};
-use stretch_core::{Calibration, Model};
+use stretch_calibrate::{Doubt, Faults, Seen, estimates_header, pressure_column, push_estimate};
 use stretch_data::files::{is_standard_output, write_whole};
-use stretch_data::{Trial, push_number, unit};
-use stretch_receptor::{Reading, Withheld};
+use stretch_data::{Trial, unit};
 use stretch_recording::{ReadOptions, Recording, RowReader};
 use stretch_sleeve::{
     AppliedGauge, GaugeCalibration, LiveGauge, SleeveCalibration, Turns, Zero, apply_gauge,
@@ -100,7 +98,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let gauge = at_rate(&gauge, trial.rate_hz().unwrap_or(record_hz))?;
     let calibration = gauge.calibration();
     let applied = apply_gauge(&gauge, &trial, follow)?;
-    write_out(args.out.as_deref(), |out| write_all(calibration, &trial, &applied.applied, out))?;
+    write_out(args.out.as_deref(), |out| applied.applied.write_csv(calibration, &trial, out))?;
     report(&gauge, &trial, &applied);
     Ok(())
 }
@@ -165,7 +163,7 @@ fn live(
         // Binary rows and arrays can only be read as a whole.
         let trial = with_notes_printed(Recording::from_reader(input, "standard input", options)?);
         let found = apply_gauge(gauge, &trial, follow)?;
-        write_all(calibration, &trial, &found.applied, out)?;
+        found.applied.write_csv(calibration, &trial, out)?;
         report(gauge, &trial, &found);
         return Ok(());
     }
@@ -174,7 +172,7 @@ fn live(
         receptor = receptor.following(gauge)?;
     }
     // A program that reads the estimates may wait for their header before it sends a row.
-    out.write_all(header(calibration).as_bytes())?;
+    out.write_all(estimates_header(calibration).as_bytes())?;
     out.flush()?;
     let mut rows = RowReader::new(input, "standard input", options)?;
     let say = |notes: Vec<String>| {
@@ -200,7 +198,7 @@ fn live(
                 }
                 warning.iter().for_each(doubt);
                 line.clear();
-                push_line(&mut line, row.time_s, &reading, calibration);
+                push_estimate(&mut line, row.time_s, &reading, calibration);
                 out.write_all(&line)?;
                 out.flush()?;
             }
@@ -213,63 +211,6 @@ fn live(
     seen.doubt().iter().for_each(doubt);
     zero_watch.end();
     Ok(())
-}
-
-/// Writes the estimates of a trial as CSV.
-pub(super) fn write_all(
-    calibration: &Calibration,
-    trial: &Trial,
-    applied: &Applied,
-    out: &mut dyn Write,
-) -> io::Result<()> {
-    out.write_all(header(calibration).as_bytes())?;
-    let mut line = Vec::with_capacity(64);
-    for (&time_s, reading) in trial.time_s.iter().zip(&applied.readings) {
-        line.clear();
-        push_line(&mut line, time_s, reading, calibration);
-        out.write_all(&line)?;
-    }
-    Ok(())
-}
-
-/// Returns the header `time_s,estimate_mm,rate_mm_per_s,branch,domain`, with the unit of the
-/// reference. The column `sd_mm` is added if the model computes a standard deviation.
-fn header(calibration: &Calibration) -> String {
-    let unit = unit(calibration.spec().reference.as_str())
-        .map_or(String::new(), |unit| format!("_{unit}"));
-    let sd = if knows_sd(calibration) { format!(",sd{unit}") } else { String::new() };
-    format!("time_s,estimate{unit},rate{unit}_per_s,branch,domain{sd}\n")
-}
-
-fn knows_sd(calibration: &Calibration) -> bool {
-    matches!(calibration.spec().model, Model::Diagnosed(_))
-}
-
-fn push_line(
-    line: &mut Vec<u8>,
-    time_s: f64,
-    reading: &Result<Reading, Withheld>,
-    calibration: &Calibration,
-) {
-    push_number(line, time_s);
-    // Writing to memory cannot fail.
-    let _ = match reading {
-        Ok(Reading { estimate, rate, branch, domain, sd }) => {
-            let branch = calibration.spec().target.branch_name(*branch);
-            let written = match rate.is_nan() {
-                true => write!(line, ",{estimate:.6},,{branch},{domain}"),
-                false => write!(line, ",{estimate:.6},{rate:.6},{branch},{domain}"),
-            };
-            match sd.filter(|_| knows_sd(calibration)) {
-                Some(sd) => written.and_then(|()| write!(line, ",{sd:.6}")),
-                None => written,
-            }
-        }
-        Err(withheld) => {
-            write!(line, ",,,,{withheld}{}", if knows_sd(calibration) { "," } else { "" })
-        }
-    };
-    line.push(b'\n');
 }
 
 /// Reports a shift of the gauge's zero once, and again only after the zero has returned.

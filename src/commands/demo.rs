@@ -19,7 +19,6 @@ use stretch_report::{Context, Judged, Subject, calibration_verdict, demo_page, r
 use stretch_sim::{ActiveEffect, RunSettings, TrialPlan, demo_preset, effect_named};
 
 use super::{
-    apply::write_all,
     calibration_text::{blocks_of_calibration, blocks_of_models, blocks_of_notes},
     diagnose::{print as print_diagnosis, told_on},
     evaluate::table_of_errors,
@@ -162,7 +161,7 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
     if let Some((_, trial)) = sessions.test.first() {
         let chosen = &calibrations.chosen.calibration;
         let applied = apply(chosen, trial)?;
-        write_whole(file("estimates.csv"), |out| write_all(chosen, trial, &applied, out))?;
+        write_whole(file("estimates.csv"), |out| applied.write_csv(chosen, trial, out))?;
     }
     let names =
         |trials: &[(TrialKind, Trial)]| trials.iter().map(|(_, t)| t.name.clone()).collect();

@@ -4,6 +4,7 @@
 mod acceptance;
 mod apply;
 mod doubt;
+mod estimates;
 mod evaluate;
 mod left_out;
 mod model_choice;
@@ -16,6 +17,7 @@ pub use apply::{
     pressure_column,
 };
 pub use doubt::{Doubt, Seen, evaluation_doubts};
+pub use estimates::{estimates_header, push_estimate};
 pub use evaluate::{
     Comparison, Estimates, Evaluation, MAX_LAG_S, MethodErrors, Methods, TrialErrors, evaluate,
     evaluate_errors, evaluate_methods,

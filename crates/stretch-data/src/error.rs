@@ -256,6 +256,34 @@ pub fn nearest<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, one)| one)
 }
 
+/// Replaces the options of the program in a message, because another interface has its own names for them. Each pair in
+/// `names` has the option without its dashes, and the replacement. If a replacement ends in `=`, the value follows
+/// directly. Other options stay, and so do the options of a whole command, such as `stretch convert --grid 100`.
+///
+/// ```
+/// use stretch_data::rename_options;
+/// let text = "give --time COL:ms, or run stretch convert --time COL:ms";
+/// let renamed = rename_options(text, &[("time", "time=")]);
+/// assert_eq!(renamed, "give time=COL:ms, or run stretch convert --time COL:ms");
+/// ```
+pub fn rename_options(text: &str, names: &[(&str, &str)]) -> String {
+    let mut parts = text.split("--");
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let end = part.find(|c: char| !c.is_ascii_lowercase() && c != '-').unwrap_or(part.len());
+        let command = out.rfind("stretch ").map_or("; ", |at| &out[at..]);
+        let is_command = !command.contains([';', ',', '(', ':']) && !command.contains(" and ");
+        match names.iter().find(|(option, _)| *option == &part[..end]) {
+            Some((_, name)) if !is_command && (out.is_empty() || out.ends_with([' ', '('])) => {
+                out += name;
+                out += if name.ends_with('=') { part[end..].trim_start() } else { &part[end..] };
+            }
+            _ => out += &format!("--{part}"),
+        }
+    }
+    out
+}
+
 /// Joins names into a phrase: `a, b and c`, or `nothing` for an empty list.
 ///
 /// ```

@@ -1,7 +1,7 @@
 //! Errors of calibrations.
 
 use stretch_core::{DesignError, Label};
-use stretch_data::in_digits;
+use stretch_data::{Trial, in_digits};
 use stretch_filter::FilterError;
 use stretch_fit::FitError;
 use stretch_receptor::ReceptorError;
@@ -59,7 +59,7 @@ pub enum CalibrateError {
     },
     /// Signal and reference are the same column.
     #[error(
-        "{column} is both the signal and the reference, but a calibration needs two columns: record a reference in the same file, such as length_mm, and name both columns"
+        "{column} is both the signal and the reference, but a calibration needs two columns: choose another column, or record a reference, such as length_mm, in the same file"
     )]
     SameColumn {
         /// The column.
@@ -248,6 +248,18 @@ pub enum CalibrateError {
         /// Sample rate of the calibration, Hz.
         expected_hz: f64,
     },
+}
+
+impl CalibrateError {
+    /// Returns the error for trials with too few samples to compare models.
+    ///
+    /// ```
+    /// let error = stretch_calibrate::CalibrateError::too_few_to_judge(&[]);
+    /// assert!(error.to_string().starts_with("0 samples are too few to leave some out of the fit"));
+    /// ```
+    pub fn too_few_to_judge(trials: &[Trial]) -> Self {
+        Self::TooFewToJudge { samples: trials.iter().map(Trial::len).sum() }
+    }
 }
 
 /// Describes a fault that follows from the unit of the signal. Any other fault keeps its own text.

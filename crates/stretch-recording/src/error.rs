@@ -49,12 +49,12 @@ pub enum RecordingError {
     },
     /// Rows of numbers without names above them.
     #[error(
-        "{file}: {rows} rows of {numbers} numbers from line {row} on, and {above}; name the columns with --columns, or put a header line above them, such as time_s,length_mm,bridge_v"
+        "{file}: {rows} of {numbers} numbers from line {row} on, and {above}; name the columns with --columns, or put a header line above them, such as time_s,length_mm,bridge_v"
     )]
     NoHeader {
         /// The file.
         file: String,
-        /// How many rows.
+        /// How many rows, such as `2 rows`.
         rows: String,
         /// Numbers in each row.
         numbers: usize,

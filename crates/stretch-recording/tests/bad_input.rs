@@ -156,7 +156,7 @@ fn rows_and_time() {
     );
     says(
         "time_s,bridge_v\n0,1,7,8\n",
-        "t.csv: 1 rows of 4 numbers from line 2 on, and no names for them in the line above \
+        "t.csv: 1 row of 4 numbers from line 2 on, and no names for them in the line above \
          (\"time_s,bridge_v\"; if its commas are decimal commas, separate the columns with \
          semicolons); name the columns with --columns, or put a header line above them, such \
          as time_s,length_mm,bridge_v",

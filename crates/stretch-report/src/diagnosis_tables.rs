@@ -13,7 +13,11 @@ use super::{
 };
 
 fn interval([low, high]: [f64; 2], text: impl Fn(f64) -> String) -> String {
-    format!("{} .. {}", text(low), text(high))
+    match [text(low), text(high)] {
+        // such as > 99 %
+        [low, high] if low == high => low,
+        [low, high] => format!("{low} .. {high}"),
+    }
 }
 
 /// A table of the gap of every stage.
@@ -80,9 +84,8 @@ pub fn candidate_table(candidates: &[Candidate]) -> Table {
         n => format!("; {n} others are below 0.5 %"),
     };
     let caption = format!(
-        "Candidates, the most probable first (none: nothing is missing; unknown: a cause outside the catalogue): probability given \
-         this catalogue; what is left before and after in multiples of the noise, all channels with a gap together; the share that \
-         closes on trials that were not fitted{others}"
+        "Candidates, the most probable first (none: nothing is missing; unknown: a cause outside the catalogue). Left: the difference \
+         as a multiple of the noise. Closes: the share of it that the candidate explains on trials that were not fitted{others}"
     );
     Table::new(
         caption,

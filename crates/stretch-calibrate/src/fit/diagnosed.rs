@@ -13,6 +13,7 @@ use super::{
     curve::{CurveRows, KNOTS, LEAST_RISE, Place, inner, rising},
     defects::{Defects, Moved},
     history::SETTLE,
+    observer::in_words,
     observer_model::{LIVE_CATCH_UP_S, Piece, candidates, judge_live, pieces},
     report::{Coefficient, FitReport, Fitted},
 };
@@ -72,10 +73,9 @@ pub(crate) fn diagnosed(
     let (forward, map) = best.ok_or(CalibrateError::NoTrials)?;
     let report = report(&forward, &map);
     let note = format!(
-        "diagnosed: {}; noise of the signal {:.4}; the speed of the motion is modelled as a random walk with a spectral density of {} 1/s^3 and a correlation time of {} s",
+        "diagnosed: {}; {}; correlation time of the speed {} s",
         prepared.options.causes.iter().map(|c| c.effect.as_str()).collect::<Vec<_>>().join(", "),
-        map.noise,
-        map.agility,
+        in_words(prepared, map.noise, map.agility),
         map.steady_s,
     );
     let Forward { errors_in, rest, .. } = forward;

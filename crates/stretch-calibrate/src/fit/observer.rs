@@ -1,6 +1,7 @@
 //! Fits a gauge's forward model, which gives the signal from the target, then the filter that inverts the model.
 
 use stretch_core::{FitSummary, Interval, Model, ObserverMap, RestTracker, Values};
+use stretch_data::unit_of;
 
 use crate::{
     CalibrateError, Memory,
@@ -63,12 +64,21 @@ pub(crate) fn observer(
     let sse = map.fit.rmse.powi(2) * map.fit.samples as f64;
     let report = FitReport::of_model(kind, &map.fit, sse, condition, coefficients, terms, None);
     let note = format!(
-        "observer: {terms} parameters; noise of the signal {:.4}; the speed of the motion is modelled as a random walk with a spectral density of {} 1/s^3{}",
-        forward.noise,
-        choice.agility,
+        "observer: {terms} parameters; {}{}",
+        in_words(prepared, forward.noise, choice.agility),
         choice.rest.map_or(String::new(), |r| format!(", baseline leaking {:.4} a second", r.leak)),
     );
     Ok(((Model::Observer(map), vec![report], vec![note]), Choice::Observer(choice)))
+}
+
+/// States the noise of the signal and the spectral density of the rate's random walk (the agility, 1/s^3).
+pub(super) fn in_words(prepared: &Prepared, noise: f64, agility: f64) -> String {
+    let noise = format!("{noise:.4} {}", unit_of(&prepared.options.signal));
+    format!(
+        "the noise of the signal is {}; the estimate expects a speed that changes at random (spectral density {agility} 1/s^3; a greater value \
+         follows faster motions)",
+        noise.trim_end()
+    )
 }
 
 fn choose(prepared: &Prepared, rest: bool) -> Result<(Forward, ObserverMap), CalibrateError> {

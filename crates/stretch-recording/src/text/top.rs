@@ -452,7 +452,10 @@ impl Finder<'_> {
         });
         RecordingError::NoHeader {
             file: file.to_owned(),
-            rows: format!("{}{}", if is_whole { "" } else { "at least " }, block.rows),
+            rows: match block.rows {
+                1 => "1 row".to_owned(),
+                rows => format!("{}{rows} rows", if is_whole { "" } else { "at least " }),
+            },
             numbers: block.filled,
             row: self.lines[block.start].row,
             above,

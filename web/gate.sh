@@ -90,6 +90,8 @@ doubt standing_reference '$5 = 170' arbitrary_1
 doubt mounted_anew '$5 += 20' arbitrary_1
 doubt not_connected '$6 = 1.5' arbitrary_1
 doubt fitted '' inflation_50
+stretch evaluate --calibration "$fresh/poly13.json" "$bench/arbitrary_1.csv" >"$fresh/evaluated.txt" 2>/dev/null
+stretch apply --calibration "$fresh/poly13.json" "$bench/arbitrary_1.csv" --out "$fresh/estimate.csv" >/dev/null 2>&1
 # a stream twice as fast, of a sensor that is not connected
 awk -F, -v OFS=, 'NR == 1 { print $1, $6 } NR > 1 { print $1 / 2, 1.5 }' "$bench/arbitrary_1.csv" >"$fresh/doubted.txt"
 stretch apply --calibration "$fresh/poly13.json" - <"$fresh/doubted.txt" >/dev/null 2>"$fresh/doubted.told"

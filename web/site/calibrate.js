@@ -2,18 +2,21 @@
  * A calibration: a model, or the one that does best on trials left out, which workers judge side by side.
  */
 
-/** @typedef {{method: string, average_error_percent: number, rmse: number, r_squared: number|null, lag_s: number|null}} MethodErrors */
+/** @typedef {{sentence: string, table: Shown, trials: string[], doubts: string[]}} Errors */
 /** @typedef {{model: string, rmse: number|null, rmse_arbitrary: number|null, rmse_pulses: number|null, rmse_ramps: number|null, parameters: number, problem: string|null}} ModelRow */
+/** @typedef {{model: string, unit: string, rate_hz: number, why: [string, string]|null, models: ModelRow[], notes: string[]}} Made */
 
 /** Workers beyond it wait for memory more than they work. */
 const MOST_HANDS = 4;
 
 const calibration = {
+  /** What was calibrated. */
+  title: "",
+
   choices: () => ({ model: select("model").value, reference: select("reference").value, signal: select("signal").value }),
 
-  /** A column that is no column of numbers is refused as the program refuses it. @param {Hand} hand */
-  async checked(hand) {
-    const { reference, signal } = calibration.choices();
+  /** A column that is no column of numbers is refused as the program refuses it. @param {Hand} hand @param {{reference: string, signal: string}} choices */
+  async checked(hand, { reference, signal }) {
     for (const [name, about] of state.recordings) {
       const file = state.files.get(name);
       const has = (/** @type {string} */ column) => about.columns.some((c) => c.name === column);
@@ -29,12 +32,20 @@ const calibration = {
     // the slowest first: none of them is begun last
     const left = [...models].reverse();
     const judged = new Map();
+    /** @type {Set<string>} */
+    const begun = new Set();
+    const progress = () => {
+      const running = [...begun].filter((model) => !judged.has(model));
+      return `testing ${models.length} models on data left out of the fit, ${judged.size} done${running.length ? `, now ${running.join(" and ")}` : ""}`;
+    };
     const count = Math.min(navigator.hardwareConcurrency || 1, MOST_HANDS, models.length);
     const work = async (/** @type {number} */ i) => {
       const hand = i ? await crew.stocked(i) : first;
       for (let model = left.shift(); model; model = left.shift()) {
-        tell.doing(`judging ${models.length} models on trials left out, ${judged.size} done`);
+        begun.add(model);
+        tell.doing(progress());
         judged.set(model, JSON.parse(await hand.call("judge", asked, model)));
+        tell.doing(progress());
       }
     };
     await Promise.all(Array.from({ length: count }, (_, i) => work(i))).finally(crew.dismiss);
@@ -42,9 +53,9 @@ const calibration = {
   },
 
   run: () => tell.busy("calibrating", async () => {
-    html("calibrated").hidden = true;
+    page.begin("calibrated");
     const hand = await crew.stocked(CALIBRATOR);
-    await calibration.checked(hand);
+    await calibration.checked(hand, calibration.choices());
     /** @type {any} */
     let choices = calibration.choices();
     if (choices.model === "auto" || choices.model.startsWith("diagnosed")) {
@@ -59,11 +70,13 @@ const calibration = {
     calibration.tell(made);
     calibration.converter(choices.signal);
     state.record = await hand.call("record");
-    live.use(`the calibration of ${choices.reference} on ${choices.signal}`);
-    html("calibrated").classList.remove("stale");
+    live.use(`the calibration of ${choices.reference} on ${choices.signal}`, made.rate_hz);
+    calibration.title = `calibration of ${choices.reference} on ${choices.signal}, ${made.model}`;
+    page.fresh("calibrated");
     html("calibrated").hidden = false;
     tell.doing("judging it");
-    calibration.judgement(JSON.parse(await hand.call("evaluate")));
+    calibration.judgement(made, JSON.parse(await hand.call("evaluate")));
+    tell.announce(html("fitted").textContent ?? "");
   }),
 
   /** A converter of 0 to 3.3 V in the unit of the signal, unless another was written. @param {string} signal */
@@ -74,35 +87,68 @@ const calibration = {
     if (isOurs) input("adc").value = `12,0,${per[column?.unit.toLowerCase() ?? ""] ?? "3.3"}`;
   },
 
-  /** @param {{model: string, unit: string, models: ModelRow[], notes: string[]}} made */
-  tell(made) {
-    html("fitted").textContent = `${made.models.length ? "Chosen: " : ""}${made.model}.`;
-    tell.list("remarks", made.notes);
-    html("models").hidden = !made.models.length;
-    const row = (/** @type {ModelRow} */ m) =>
-      [m.model, shown(m.rmse), shown(m.rmse_arbitrary), shown(m.rmse_pulses), shown(m.rmse_ramps), m.problem ?? String(m.parameters)];
-    tell.table("rows", made.models.map(row), made.models.findIndex((m) => m.model === made.model));
-    tell.table("errors", []);
+  /** @param {Made} made */
+  tell({ model, unit, why, models, notes }) {
+    html("fitted").textContent = why ? `Chosen: ${why[0]}.` : `${model} was fitted.`;
+    tell.list("remarks", notes);
+    html("models").hidden = !models.length;
+    /** @type {[string, (m: ModelRow) => number|null][]} Kinds of recordings: of one kind alone the column would repeat the RMSE. */
+    const kinds = [["arbitrary", (m) => m.rmse_arbitrary], ["pulses", (m) => m.rmse_pulses], ["ramps", (m) => m.rmse_ramps]];
+    const known = kinds.filter(([, of]) => models.some((m) => of(m) !== null));
+    const split = known.length > 1 ? known : [];
+    tell.table("rows", {
+      head: [`model, tested on ${why?.[1]} left out`, calibration.unit("RMSE", unit), ...split.map(([kind]) => calibration.unit(kind, unit)), "parameters"],
+      rows: models.map((m) => [m.model, shown(m.rmse), ...split.map(([, of]) => shown(of(m))), m.problem ?? String(m.parameters)]),
+      best: models.findIndex((m) => m.model === model),
+    });
+    tell.table("errors", { head: [], rows: [] });
     tell.list("doubts", []);
     html("judged-on").textContent = "";
-    html("unit").textContent = made.unit;
   },
 
-  /** @param {{evaluation: {unit: string, trials: {trial: string}[], pooled: MethodErrors[]}, doubts: {text: string}[], held_out: boolean}} judgement */
-  judgement({ evaluation: { unit, trials, pooled }, doubts, held_out }) {
-    const row = (/** @type {MethodErrors} */ e) =>
-      [e.method, shown(e.average_error_percent, 3), shown(e.rmse), e.r_squared?.toFixed(4).replace("-", "−") ?? "–", shown(e.lag_s, 3)];
-    tell.table("errors", pooled.map(row), pooled.length - 1);
-    tell.list("doubts", doubts.map((doubt) => doubt.text));
-    const names = trials.map((t) => t.trial);
-    const own = pooled[pooled.length - 1];
-    const where = held_out ? "on recordings that were not fitted" : "on the data of the fit: for an honest error drop another recording and choose “only test” for it above";
-    html("fitted").textContent += ` Off by ${shown(own.rmse, 3)} ${unit} (root mean square) ${where}.`;
-    html("judged-on").textContent = `Judged on ${names.slice(0, 4).join(", ")}${names.length > 4 ? ` and ${names.length - 4} more` : ""}.`;
+  /** @param {string} name @param {string} unit */
+  unit: (name, unit) => (unit ? `${name}, ${unit}` : name),
+
+  /** @param {Made} made @param {Errors & {held_out: boolean}} errors */
+  judgement({ why }, errors) {
+    const isFirst = !why || errors.held_out;
+    html("fitted").textContent = [why ? html("fitted").textContent : "", isFirst ? errors.sentence : ""].join(" ").trim();
+    tell.table("errors", errors.table);
+    tell.list("doubts", errors.doubts);
+    const advice = "These recordings were fitted. To see an honest error, drop another recording and choose “only test” for it above.";
+    html("judged-on").textContent = `${calibration.judgedOn(errors.trials)}${errors.held_out ? "" : ` ${advice}`}`;
   },
+
+  /** @param {string[]} names */
+  judgedOn: (names) => `Judged on ${names.slice(0, 4).join(", ")}${names.length > 4 ? ` and ${names.length - 4} more` : ""}.`,
 
   /** @param {string} name @param {string} method @param {string[]} args */
   save: (name, method, ...args) => tell.busy("writing", async () => {
     tell.save(name, await crew.hand(CALIBRATOR).call(method, ...args));
+  }),
+};
+
+/** A calibration file that was dropped: its errors on the recordings, and its estimates. */
+const evaluation = {
+  run: () => tell.busy("evaluating", async () => {
+    page.begin("evaluated");
+    const hand = await crew.stocked(CALIBRATOR);
+    if (state.dropped) await calibration.checked(hand, state.dropped);
+    /** @type {Errors} */
+    const errors = JSON.parse(await hand.call("evaluate_record"));
+    html("off").textContent = errors.sentence;
+    tell.table("record-errors", errors.table);
+    tell.list("record-doubts", errors.doubts);
+    html("record-judged-on").textContent = calibration.judgedOn(errors.trials);
+    html("evaluated").hidden = false;
+    page.fresh("evaluated");
+    tell.announce(errors.sentence);
+  }),
+
+  save: () => tell.busy("applying the calibration", async () => {
+    const hand = await crew.stocked(CALIBRATOR);
+    const { csv, doubts } = JSON.parse(await hand.call("estimates", select("shown").value));
+    tell.list("record-doubts", doubts);
+    tell.save("estimate.csv", csv, "text/csv");
   }),
 };

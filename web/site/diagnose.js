@@ -2,15 +2,19 @@
  * A diagnosis of the whole rig or of the gauge alone.
  */
 
-/** @typedef {{sentence: string, notes: string[], seconds: number, candidates: string[][], caption: string, no_rig: string|null}} Told */
+/** @typedef {{sentence: string, notes: string[], seconds: number, candidates: Shown, caption: string, no_rig: string|null}} Told */
 
 const diagnosis = {
+  /** What was diagnosed. */
+  title: "",
+
   run: () => tell.busy("preparing", async () => {
-    html("diagnosed").hidden = true;
+    page.begin("diagnosed");
     const hand = await crew.stocked(DIAGNOSER);
     const alone = select("subject").value === "gauge";
-    if (alone) await calibration.checked(hand);
+    if (alone) await calibration.checked(hand, calibration.choices());
     const { reference, signal } = calibration.choices();
+    diagnosis.title = `diagnosis of ${alone ? `${reference} on ${signal}` : "the whole rig"}`;
     diagnosis.tell(JSON.parse(await hand.call("diagnose", JSON.stringify({ reference, signal, alone }))));
   }),
 
@@ -20,11 +24,12 @@ const diagnosis = {
     html("sentence").dataset.seconds = String(seconds);
     tell.list("findings", notes);
     html("candidates-caption").textContent = caption;
-    tell.table("candidates", candidates, 0);
+    tell.table("candidates", candidates);
+    page.fresh("diagnosed");
     button("save-rig").disabled = no_rig !== null;
     html("no-rig").textContent = no_rig ? `No rig file: ${no_rig}.` : "";
-    html("diagnosed").classList.remove("stale");
     html("diagnosed").hidden = false;
+    tell.announce(sentence);
   },
 
   /** @param {string} name @param {string} which */

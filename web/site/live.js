@@ -18,9 +18,10 @@ const live = {
   lines: [],
   isDrawn: true,
 
-  /** @param {string} whose */
-  use(whose) {
-    html("record-in-use").textContent = `The length comes from ${whose}.`;
+  /** @param {string} whose @param {number} rate Samples per second. */
+  use(whose, rate) {
+    html("record-in-use").textContent = `The estimate comes from ${whose}.`;
+    input("line-rate").value = String(Number(rate.toPrecision(6)));
   },
 
   async begin() {

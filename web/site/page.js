@@ -14,8 +14,10 @@ const MOST_POINTS = 1500;
 const page = {
   /** @param {Map<string, File>} files Reads what was dropped beside what is there. */
   take: (files) => tell.busy("reading", async () => {
-    page.changed("calibrated", "diagnosed");
+    page.changed("calibrated", "diagnosed", "evaluated");
     for (const [name, file] of files) {
+      // of several calibration files or rig files the last one counts
+      state.files.delete(name);
       state.files.set(name, file);
       crew.hands.forEach((hand) => hand.has.delete(name));
     }
@@ -40,32 +42,41 @@ const page = {
       }
     }
     await page.show();
-    if (wrong.length) tell.wrong(wrong.join("\n"));
+    if (!wrong.length) return;
+    part("reading", HTMLDetailsElement).open = true;
+    tell.wrong(wrong.join("\n"));
   }),
 
   /** @param {any} about @param {File} file */
   async told(about, file) {
     if (about.kind === "recording") state.recordings.set(about.name, about);
     if (about.kind === "record") {
-      state.files.delete(about.name);
       state.record = await file.text();
-      live.use(`${about.name}, ${about.reference} on ${about.signal}`);
+      state.dropped = about;
+      html("record-dropped").textContent = `${about.name}: ${about.reference} on ${about.signal}, ${shown(about.rate_hz)} samples per second.`;
+      live.use(`${about.name}, ${about.reference} on ${about.signal}`, about.rate_hz);
     }
   },
 
   async show() {
     const all = [...state.recordings.values()];
     for (const id of ["calibration", "diagnosis"]) html(id).hidden = !all.length;
+    html("evaluation").hidden = !all.length || !state.dropped;
     html("recordings").hidden = !all.length && !page.refused.size;
     html("clear").hidden = html("recordings").hidden;
-    tell.table("list", all.map((a) =>
-      [a.name, String(a.rows), shown(a.seconds, 5), shown(a.rate_hz, 4), a.columns.map((c) => c.name).join(", ")]));
+    tell.table("list", {
+      head: ["file", "rows", "seconds", "samples per second", "columns", "use"],
+      rows: all.map((a) => [a.name, String(a.rows), shown(a.seconds, 5), shown(a.rate_hz, 4), a.columns.map((c) => c.name).join(", ")]),
+    });
     page.uses();
     const sum = (/** @type {(a: About) => number} */ of) => all.reduce((before, a) => before + of(a), 0);
     html("counted").textContent =
       `${all.length === 1 ? "1 recording" : `${all.length} recordings`}, ${sum((a) => a.rows)} rows, ${shown(sum((a) => a.seconds), 6)} s`;
     part("each", HTMLDetailsElement).open = all.length <= MOST_OPEN;
-    tell.list("notes", all.flatMap((a) => a.notes.map((note) => `${a.name}: ${note}`)));
+    const hasRig = [...state.files.keys()].some((name) => name.endsWith(".toml") && name !== "dataset.toml");
+    /** @type {string[]} */
+    const rigs = hasRig ? JSON.parse(await (await crew.stocked(CALIBRATOR)).call("rig_notes")) : [];
+    tell.list("notes", [...all.flatMap((a) => a.notes.map((note) => `${a.name}: ${note}`)), ...rigs]);
     page.guess(all);
     page.options("shown", all.map((a) => a.name), select("shown").value);
     await page.look();
@@ -122,7 +133,23 @@ const page = {
   },
 
   /** Greys results of earlier choices. @param {string[]} ids */
-  changed: (...ids) => ids.forEach((id) => html(id).classList.add("stale")),
+  changed: (...ids) => ids.forEach((id) => page.mark(id, true)),
+
+  /** @param {string} id Results of the present choices. */
+  fresh: (id) => page.mark(id, false),
+
+  /** Before results are computed again. @param {string} id */
+  begin(id) {
+    html(id).hidden = true;
+    if (report.of === id) report.close();
+  },
+
+  /** What is stale is neither saved nor reported. @param {string} id @param {boolean} isStale */
+  mark(id, isStale) {
+    html(id).classList.toggle("stale", isStale);
+    for (const one of html(id).querySelectorAll("button")) one.disabled = isStale;
+    if (isStale && report.of === id) report.close();
+  },
 
   async look() {
     const [name, reference, signal] = ["shown", "reference", "signal"].map((id) => select(id).value);
@@ -156,7 +183,9 @@ const page = {
     state.recordings.clear();
     state.held.clear();
     page.refused.clear();
-    for (const id of ["calibrated", "diagnosed"]) html(id).hidden = true;
+    state.dropped = null;
+    for (const id of ["calibrated", "diagnosed", "evaluated"]) html(id).hidden = true;
+    tell.list("record-doubts", []);
     report.close();
     tell.wrong("");
     page.show();
@@ -250,15 +279,17 @@ const dropped = {
   }
   select("model").onchange = () => page.changed("calibrated");
   select("subject").onchange = () => page.changed("diagnosed");
+  button("evaluate").onclick = evaluation.run;
+  button("save-estimates").onclick = evaluation.save;
   button("calibrate").onclick = calibration.run;
   button("save-record").onclick = () => calibration.save("calibration.json", "record");
   button("save-header").onclick = () => calibration.save("stretch.h", "header", input("adc").value);
   button("see-calibration").onclick = () => tell.busy("drawing the report", async () => {
-    report.open("calibration.html", await crew.hand(CALIBRATOR).call("report"));
+    report.open("calibrated", "calibration.html", calibration.title, await crew.hand(CALIBRATOR).call("report"));
   });
   button("diagnose").onclick = diagnosis.run;
   button("see-diagnosis").onclick = () => tell.busy("drawing the report", async () => {
-    report.open("diagnosis.html", await crew.hand(DIAGNOSER).call("diagnosis", "report"));
+    report.open("diagnosed", "diagnosis.html", diagnosis.title, await crew.hand(DIAGNOSER).call("diagnosis", "report"));
   });
   button("save-diagnosis").onclick = () => diagnosis.save("diagnosis.json", "json");
   button("save-rig").onclick = () => diagnosis.save("fixed.toml", "rig");
@@ -277,6 +308,6 @@ const dropped = {
       const rest = option.value.endsWith("+rest") ? ", follows drift" : "";
       option.text = `${option.value}: ${words[option.value] ?? "with memory"}${rest}`;
     }
-    html("bits").textContent = `${await first.call("sound")} calibrations were just run in this browser, with the same results, bit for bit, as in the program and on boards`;
+    html("bits").textContent = `${await first.call("sound")} test calibrations gave the same results in this browser, bit for bit, as in the program and on boards`;
   }).catch(tell.wrong);
 })();

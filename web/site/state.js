@@ -6,6 +6,8 @@
 /** @typedef {{kind: "recording", name: string, rows: number, seconds: number, rate_hz: number|null, columns: Column[], notes: string[]}} About */
 /** @typedef {{kind: "record", name: string, signal: string, reference: string, rate_hz: number}} RecordAbout */
 
+/** @typedef {{head: string[], rows: string[][], best?: number|null}} Shown */
+
 /** @template {Element} T @param {string} id @param {{new(): T}} kind @returns {T} */
 const part = (id, kind) => {
   const element = document.getElementById(id);
@@ -33,6 +35,8 @@ const state = {
   edition: 0,
   /** The record that the live view uses, as JSON. */
   record: "",
+  /** The calibration file that was dropped last. @type {RecordAbout|null} */
+  dropped: null,
 };
 
 /** Those who work: the first holds the calibration, the last the diagnosis, those between judge models. */
@@ -97,6 +101,18 @@ const tell = {
   doing(text) {
     html("doing").dataset.text = text;
     html("doing").textContent = text;
+    tell.announce(text);
+  },
+
+  /** Says it to those who do not see the page. @param {string} text */
+  announce(text) {
+    html("announced").textContent = text;
+  },
+
+  cancelled() {
+    html("cancelled").textContent = `Cancelled: ${html("doing").dataset.text}.`;
+    html("cancelled").hidden = false;
+    tell.announce("Cancelled.");
   },
 
   /** @param {unknown} error */
@@ -114,6 +130,7 @@ const tell = {
     }
     crew.isBusy = true;
     tell.wrong("");
+    html("cancelled").hidden = true;
     tell.doing(what);
     html("busy").hidden = false;
     document.body.dataset.busy = "1";
@@ -125,7 +142,8 @@ const tell = {
     try {
       await work();
     } catch (error) {
-      if (!(error instanceof Cancelled)) tell.wrong(error);
+      if (error instanceof Cancelled) tell.cancelled();
+      else tell.wrong(error);
     } finally {
       window.clearInterval(crew.clock);
       html("busy").hidden = true;
@@ -152,9 +170,16 @@ const tell = {
     }));
   },
 
-  /** @param {string} id @param {string[][]} rows @param {number} [best] The first cell of a row is its name. */
-  table(id, rows, best = -1) {
-    const heads = [...(html(id).closest("table")?.querySelectorAll("thead th") ?? [])].map((th) => th.textContent ?? "");
+  /** @param {string} id @param {Shown} table The first cell of a row is its name. */
+  table(id, { head: heads, rows, best }) {
+    const line = document.createElement("tr");
+    line.append(...heads.map((text) => {
+      const cell = document.createElement("th");
+      cell.scope = "col";
+      cell.textContent = text;
+      return cell;
+    }));
+    html(id).closest("table")?.tHead?.replaceChildren(line);
     html(id).replaceChildren(...rows.map((cells, i) => {
       const row = document.createElement("tr");
       if (i === best) row.className = "best";
@@ -173,12 +198,16 @@ const tell = {
 
 /** The report that is open. */
 const report = {
+  /** The results that it is about. */
+  of: "",
   name: "",
   text: "",
+  /** What had the focus before. @type {Element|null} */
+  opener: null,
 
-  /** @param {string} name @param {string} text */
-  open(name, text) {
-    Object.assign(report, { name, text });
+  /** @param {string} of @param {string} name @param {string} title @param {string} text */
+  open(of, name, title, text) {
+    Object.assign(report, { of, name, text, opener: document.activeElement });
     const frame = part("page", HTMLIFrameElement);
     frame.onload = () => {
       // as long as what is in it: a phone has one thing to scroll
@@ -186,12 +215,17 @@ const report = {
       if (inside) frame.style.height = `${inside.scrollHeight + 4}px`;
     };
     frame.srcdoc = text;
+    frame.title = html("report-name").textContent = `Report: ${title}`;
     html("report").hidden = false;
     html("report").scrollIntoView();
+    html("report-name").focus({ preventScroll: true });
   },
 
   close() {
+    const hasFocus = html("report").contains(document.activeElement);
     part("page", HTMLIFrameElement).srcdoc = "";
     html("report").hidden = true;
+    report.of = "";
+    if (hasFocus && report.opener instanceof HTMLElement) report.opener.focus();
   },
 };

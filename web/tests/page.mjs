@@ -99,6 +99,13 @@ const same = async () => {
   await page.keyboard.press("+");
   check(await plotted.evaluate((e) => Number(e.dataset.to) - Number(e.dataset.from)) > 0, "its figures answer");
   check((await saved(page, "save-report")).text.startsWith("<!DOCTYPE html>"), "the report is saved");
+  check((await page.innerText("#report-name")).includes("length_mm on bridge_v, observer"), `its heading names it: ${await page.innerText("#report-name")}`);
+  check(await page.evaluate(() => document.getElementById("report").contains(document.activeElement)), "it has the focus");
+  await page.click("#close-report");
+  check(await page.evaluate(() => document.activeElement.id) === "see-calibration", "closed, the focus goes back");
+  await press(page, "see-calibration");
+  await page.selectOption("#model", "linear");
+  check(await page.isHidden("#report"), "a report of other choices is closed");
   await press(page, "diagnose");
   const sentence = await page.innerText("#sentence");
   const flowing = (words) => words.replace(/\s+/g, " ").trim();
@@ -122,7 +129,7 @@ const stranger = async () => {
   await page.selectOption("#model", "auto");
   await press(page, "calibrate");
   check(await said(page) === "", `auto: ${await said(page)}`);
-  check((await page.innerText("#fitted")).startsWith("Chosen: observer. Off by"), "auto chooses");
+  check((await page.innerText("#fitted")).startsWith("Chosen: observer"), "auto chooses");
   // the sample is the data set of the program's simulator, to the bit
   check((await saved(page, "save-record")).text === text(join(wanted, "observer.json")), "and fits what the program fits");
   const offered = await page.locator("#model option").count() - 1;
@@ -135,6 +142,7 @@ const stranger = async () => {
   await page.click("#cancel");
   await idle(page);
   check(await page.isHidden("#diagnosed") && await said(page) === "", "a diagnosis is cancelled");
+  check((await page.innerText("#cancelled")).startsWith("Cancelled: "), "and the page says so");
   check((await saved(page, "save-record")).text === text(join(wanted, "observer.json")), "what was calibrated before stays");
   await page.selectOption("#subject", "gauge");
   await press(page, "diagnose");
@@ -161,10 +169,12 @@ const refused = async () => {
   await put(page, [file("held.csv", `time_s,pos_mm,out_v\n${rows.map((row) => `${row}1`).join("\n")}\n`)]);
   await page.selectOption("#list tr:nth-child(2) select", "test");
   await press(page, "calibrate");
-  check((await page.innerText("#fitted")).includes("not fitted"), `a recording is held out: ${await page.innerText("#fitted")}`);
+  check((await page.innerText("#fitted")).includes("not used for the fit"), `a recording is held out: ${await page.innerText("#fitted")}`);
   check((await page.innerText("#judged-on")).startsWith("Judged on held"), `and judged on: ${await page.innerText("#judged-on")}`);
   await page.selectOption("#model", "poly13");
   check(await page.locator("#calibrated.stale").count() === 1, "results of other choices are greyed");
+  check(await page.isDisabled("#save-record") && await page.isDisabled("#see-calibration"), "and cannot be saved");
+  for (const fault of await page.evaluate(faults)) check(false, `greyed: ${fault}`);
   await page.selectOption("#model", "linear");
   await press(page, "calibrate");
   check(await page.locator("#calibrated.stale").count() === 0, "until they are computed again");
@@ -178,8 +188,25 @@ const refused = async () => {
   await press(page, "calibrate");
   check(await page.inputValue("#adc") === "12,0,3300", "the converter's volts are in the signal's unit");
   await press(page, "clear");
+  await put(page, [file("bare.csv", rows.join("\n"))]);
+  check((await said(page)).includes("name the columns with “Column names”"), `a field of the page is named: ${await said(page)}`);
+  check(await page.getAttribute("#reading", "open") !== null, "and shown");
+  const dated = rows.map((row, i) => `02/03/2026 10:00:${String((i * 0.01).toFixed(2)).padStart(5, "0")},${row.split(",").slice(1)}`);
+  await press(page, "clear");
+  await put(page, [file("dates.csv", `time_s,pos_mm,out_v\n${dated.join("\n")}\n`)]);
+  check((await said(page)).includes("“Time column” time_s:dmy"), `the order of dates is asked for: ${await said(page)}`);
+  await page.selectOption("#time-unit", "dmy");
+  await press(page, "again");
+  check(await said(page) === "" && await page.locator("#list tr").count() === 1, `and given: ${await said(page)}`);
+  await page.selectOption("#time-unit", "");
+  await press(page, "clear");
+  await put(page, [file("short.csv", `time_s,pos_mm,out_v\n${rows.slice(0, 40).join("\n")}\n`)]);
+  await page.selectOption("#model", "auto");
+  await press(page, "calibrate");
+  check(!(await said(page)).includes("name at least one file"), `too short: ${await said(page)}`);
+  await press(page, "clear");
   await put(page, [file("clock.csv", `t,pos_mm,out_v\n${rows.join("\n")}\n`)]);
-  await page.click("#reading summary");
+  if (await page.getAttribute("#reading", "open") === null) await page.click("#reading summary");
   await page.fill("#time", "t");
   await page.selectOption("#time-unit", "ms");
   await press(page, "again");
@@ -190,7 +217,7 @@ const refused = async () => {
 };
 
 /** The doubts that the program printed on standard error, without the summary; its lines break at the width of a terminal. */
-const toldBy = (name) => text(join(wanted, name)).replace(/^[\d,]+ samples: .*?(?=^stretch: |$(?![^]))/gms, "").replace(/^stretch: /gm, "\u0000").replace(/\s+/g, " ").split("\u0000").map((one) => one.trim()).filter(Boolean);
+const toldBy = (name) => text(join(wanted, name)).replace(/^[\d,]+ samples: .*?(?=^stretch: |$(?![^]))/gms, "").replace(/^stretch: /gm, "\u0000").replace(/\s+/g, " ").replaceAll("stretch convert", "the program: stretch convert").split("\u0000").map((one) => one.trim()).filter(Boolean);
 
 /** What makes one doubt an evaluation is said in the program's words. */
 const doubted = async () => {
@@ -208,6 +235,27 @@ const doubted = async () => {
     check(found.join("\n") === told.join("\n"), `${member}: the page doubts ${found.join("; ")}, the program ${told.join("; ")}`);
     await page.context().close();
   }
+};
+
+/** A calibration file is evaluated and applied as by the program, and a rig file is used or refused aloud. */
+const used = async () => {
+  const page = await opened("used");
+  await put(page, [join(wanted, "poly13.json"), join(bench, "arbitrary_1.csv")]);
+  await press(page, "evaluate");
+  check(await said(page) === "", `a calibration file: ${await said(page)}`);
+  const flat = (words) => words.replace(/\s+/g, " ").trim();
+  check(flat(text(join(wanted, "evaluated.txt"))).startsWith(flat(await page.innerText("#off"))), `its error is the program's: ${await page.innerText("#off")}`);
+  check(await page.locator("#record-errors tr").count() === 2, "raw and itself are judged");
+  const estimates = await saved(page, "save-estimates");
+  check(estimates.name === "estimate.csv" && estimates.text === text(join(wanted, "estimate.csv")), "its estimates are the program's");
+  check(await page.inputValue("#line-rate") === "100", "live lines have its rate");
+  await put(page, ["nominal.toml", "dataset.toml"].map((name) => join(bench, name)));
+  await put(page, [{ name: "fixed.toml", mimeType: "text/plain", buffer: readFileSync(join(bench, "nominal.toml")) }]);
+  const notes = await page.innerText("#notes");
+  check(notes.includes("nominal.toml: a diagnosis of the whole rig begins") && notes.includes("fixed.toml: it is not used"), `rig files: ${notes}`);
+  const names = await page.locator("button").allInnerTexts();
+  check(new Set(names).size === names.length, `no two buttons have a name: ${names}`);
+  await page.context().close();
 };
 
 /** Layout and contrast, from a phone to a desk. */
@@ -320,7 +368,7 @@ const fast = async () => {
   await page.context().close();
 };
 
-const steps = { bits, same, stranger, refused, doubted, looks, live, fast };
+const steps = { bits, same, stranger, refused, doubted, used, looks, live, fast };
 const only = process.env.ONLY?.split(",");
 for (const [name, step] of Object.entries(steps)) {
   if (only && !only.includes(name)) continue;

@@ -2,20 +2,21 @@
 
 use serde::{Deserialize, Serialize};
 use stretch_calibrate::{
-    Calibrated, Cause, Doubt, Evaluation, Judged, ModelChoice, ModelKind, ModelRow, Options,
-    calibrate, candidate_models, choose_among, evaluate, evaluation_doubts, explains_little,
-    explains_nothing, judge_model, parse_adc, without_gross_errors,
+    CalibrateError, Calibrated, Cause, Evaluation, Judged, ModelChoice, ModelKind, ModelRow,
+    Options, calibrate, candidate_models, choose_among, evaluate, evaluation_doubts,
+    explains_little, explains_nothing, judge_model, parse_adc, without_gross_errors,
 };
 use stretch_data::{Split, Trial};
 use stretch_export::gauge_header;
 use stretch_problem::Causes;
-use stretch_report::{Context, calibration_page};
+use stretch_report::{Context, calibration_page, calibration_verdict};
 use stretch_sleeve::{GaugeCalibration, calibrate_gauge};
 
 use crate::{
+    evaluation::Errors,
     files::Files,
     progress,
-    said::{Said, to_json},
+    said::{Said, in_page, to_json},
 };
 
 /// The user's choices, and results of earlier steps.
@@ -95,12 +96,13 @@ pub(crate) struct Made {
     judged: Option<(Calibrated, Judgement)>,
 }
 
-/// Errors of a calibration, doubts about them, and whether they were measured on trials that were
-/// not fitted.
+/// Errors of a calibration, and whether they were measured on trials that were not fitted.
 #[derive(Debug, Serialize)]
 pub(crate) struct Judgement {
+    #[serde(skip)]
     evaluation: Evaluation,
-    doubts: Vec<Doubt>,
+    #[serde(flatten)]
+    errors: Errors,
     held_out: bool,
 }
 
@@ -108,8 +110,11 @@ pub(crate) struct Judgement {
 struct Told<'a> {
     model: String,
     unit: &'a str,
+    rate_hz: f64,
+    /// The reason for the choice, and what was left out of each fit, if a model was chosen.
+    why: Option<(&'a str, &'a str)>,
     models: &'a [ModelRow],
-    notes: &'a [String],
+    notes: Vec<String>,
 }
 
 impl Made {
@@ -139,8 +144,10 @@ impl Made {
         to_json(&Told {
             model: self.options.model.to_string(),
             unit: self.calibrated.calibration.spec().reference.unit(),
+            rate_hz: self.calibrated.calibration.spec().sample_rate_hz.hz(),
+            why: self.choice.as_ref().map(|choice| (choice.why.as_str(), choice.left_out)),
             models: self.choice.as_ref().map_or(&[], |choice| &choice.rows),
-            notes: &self.calibrated.notes,
+            notes: self.calibrated.notes.iter().map(|note| in_page(note)).collect(),
         })
     }
 
@@ -173,15 +180,36 @@ impl Made {
             }
             let held_out = !test.is_empty();
             let judged_on = if held_out { &test } else { &self.trials };
-            let evaluation = evaluate(&shown, judged_on)?;
+            let mut evaluation = evaluate(&shown, judged_on)?;
             let mut doubts = evaluation_doubts(&shown, judged_on, &evaluation);
             // The page itself states that without a test trial the fitted trials are evaluated.
             doubts.retain(|doubt| held_out || doubt.code != "fitted_trials");
-            self.judged = Some((linear, Judgement { evaluation, doubts, held_out }));
+            // The sentence is about the calibration, even if the line has smaller errors.
+            let all = evaluation.pooled.clone();
+            evaluation.pooled.drain(1..all.len() - 1);
+            let sentence = calibration_verdict(&stretch_report::Judged {
+                calibrated: &[(&name, &self.calibrated)],
+                evaluation: &evaluation,
+                context: &self.context(Vec::new()),
+            });
+            evaluation.pooled = all;
+            let errors = Errors::of(sentence, &evaluation, &doubts);
+            self.judged = Some((linear, Judgement { evaluation, errors, held_out }));
         }
         match &self.judged {
             Some((_, judgement)) => Ok(judgement),
             None => Err(Said(String::new())),
+        }
+    }
+
+    fn context(&self, test: Vec<Trial>) -> Context {
+        let (reference, signal) = (&self.options.reference, &self.options.signal);
+        Context {
+            title: format!("Calibration of {reference} on {signal}"),
+            calibrated_on: self.trials.iter().map(|trial| trial.name.clone()).collect(),
+            tested_on: test.into_iter().map(|trial| trial.name).collect(),
+            notes: self.calibrated.notes.clone(),
+            ..Context::default()
         }
     }
 
@@ -195,14 +223,7 @@ impl Made {
         if self.options.model != ModelKind::Linear {
             shown.push((name.as_str(), &self.calibrated));
         }
-        let names = |trials: &[Trial]| trials.iter().map(|trial| trial.name.clone()).collect();
-        let context = Context {
-            title: format!("Calibration of {} on {}", self.options.reference, self.options.signal),
-            calibrated_on: names(&self.trials),
-            tested_on: names(&files.trials(Split::Test)?),
-            notes: self.calibrated.notes.clone(),
-            ..Context::default()
-        };
+        let context = self.context(files.trials(Split::Test)?);
         let judged = stretch_report::Judged { calibrated: &shown, evaluation, context: &context };
         Ok(calibration_page(&judged))
     }
@@ -214,11 +235,14 @@ fn chosen(
     options: &Options,
     judged: &[(String, Result<Judged, String>)],
 ) -> Result<ModelChoice, Said> {
+    // A part without samples gives this error, which would mislead a user who dropped recordings.
+    let misleading = CalibrateError::NoTrials.to_string();
     let first = judged.iter().find_map(|(_, judged)| judged.as_ref().err().cloned());
+    let first = first.filter(|problem| *problem != misleading).map(Said);
     let kind = |(name, judged): &(String, Result<Judged, String>)| {
         Ok::<_, Said>((name.parse::<ModelKind>()?, judged.clone()))
     };
     let judged = judged.iter().map(kind).collect::<Result<Vec<_>, _>>()?;
-    let none = || first.unwrap_or_else(|| "no model could be judged".to_owned());
-    choose_among(trials, options, judged).ok_or_else(|| Said(none()))
+    choose_among(trials, options, judged)
+        .ok_or_else(|| first.unwrap_or_else(|| CalibrateError::too_few_to_judge(trials).into()))
 }

@@ -5,11 +5,11 @@ use stretch_gap::Options;
 use stretch_problem::{
     Examined, GaugeSetup, GaugeSimulator, Problem, RigSession, RigSetup, RigSimulator, in_words,
 };
-use stretch_report::{Subject, Table, candidate_table, diagnosis_page};
+use stretch_report::{Subject, candidate_table, diagnosis_page};
 use stretch_sim::{Catalogue, GaugeRig, Rig};
 use wasm_bindgen::prelude::*;
 
-use crate::{files::Files, progress, said::Said};
+use crate::{evaluation::Shown, files::Files, progress, said::Said};
 
 #[wasm_bindgen]
 extern "C" {
@@ -47,7 +47,7 @@ pub(crate) struct Told {
     notes: Vec<String>,
     seconds: f64,
     /// The report's table of candidates.
-    candidates: Vec<Vec<String>>,
+    candidates: Shown,
     caption: String,
     /// The reason why no rig file can be written.
     no_rig: Option<String>,
@@ -65,10 +65,10 @@ impl Found {
 
     pub(crate) fn told(&self) -> Told {
         let diagnosis = in_words(&self.examined.diagnosis);
-        let Table { rows, caption, .. } = candidate_table(&diagnosis.candidates);
+        let table = candidate_table(&diagnosis.candidates);
         Told {
-            candidates: rows,
-            caption,
+            caption: table.caption.clone(),
+            candidates: table.into(),
             sentence: diagnosis.sentence,
             notes: diagnosis.notes.into_iter().map(String::from).collect(),
             seconds: self.examined.diagnosis.runtime_s,
@@ -94,15 +94,14 @@ impl Found {
 /// Builds the problem from the dropped files.
 fn problem(files: &Files, asked: &Asked) -> Result<Problem, Said> {
     let (session, catalogue) = (files.session()?, Catalogue::default());
-    let file = files.rig()?;
+    let file = files.rig(asked.alone)?;
     if !asked.alone {
         let rig = file.map(Rig::from_file).transpose()?.unwrap_or_default();
         let session = RigSession::new(&session)?;
         let setup = RigSetup { session, rig, catalogue: &catalogue };
         return Ok(RigSimulator::new(setup)?.into());
     }
-    let rig = file.filter(|file| file.kind.as_deref() == Some("gauge"));
-    let rig = rig.map(GaugeRig::from_file).transpose()?;
+    let rig = file.map(GaugeRig::from_file).transpose()?;
     Ok(GaugeSimulator::new(&GaugeSetup {
         trials: &session,
         reference: &asked.reference,

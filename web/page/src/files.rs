@@ -1,16 +1,20 @@
 //! Files dropped on the page: recordings, and the files that describe how they belong together.
 
 use serde::{Deserialize, Serialize};
-use stretch_calibrate::calibration_from_json;
 use stretch_data::{DataSet, RigFile, SessionTrial, Split, Trial, unit};
-use stretch_recording::{ReadOptions, Recording, TimeUnit};
+use stretch_recording::{ReadOptions, Recording, TimeColumn};
+use stretch_sleeve::GaugeCalibration;
 
-use crate::{Read, said::Said};
+use crate::{
+    Read,
+    said::{Said, in_page},
+};
 
 /// Reading options for recordings that are not self-describing. Empty texts select the defaults.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default)]
 pub(crate) struct Asked {
+    /// The time column, with its unit or the order of its dates behind a colon: see [`TimeColumn`].
     time: String,
     time_unit: String,
     columns: String,
@@ -20,21 +24,21 @@ pub(crate) struct Asked {
 }
 
 impl Asked {
-    fn options(&self) -> ReadOptions {
-        let mut options = self.require.iter().fold(ReadOptions::new(), |o, name| o.require(name));
-        if !self.time.is_empty() {
-            options = options.time(&self.time);
-        }
-        if let Some(unit) = TimeUnit::abbreviated(&self.time_unit) {
-            options = options.time_unit(unit);
-        }
+    fn options(&self) -> Result<ReadOptions, Said> {
+        let time = if self.time.is_empty() { "time_s" } else { &self.time };
+        let time = match self.time_unit.as_str() {
+            "" => time.to_owned(),
+            unit => format!("{time}:{unit}"),
+        };
+        let options = time.parse::<TimeColumn>().map_err(Said)?.options();
+        let mut options = self.require.iter().fold(options, |o, name| o.require(name));
         if !self.columns.is_empty() {
             options = options.columns(self.columns.split(',').map(str::trim));
         }
-        match self.sample_rate_hz {
+        Ok(match self.sample_rate_hz {
             Some(hz) => options.sample_rate_hz(hz),
             None => options,
-        }
+        })
     }
 }
 
@@ -71,7 +75,7 @@ impl About {
             seconds: trial.duration_s(),
             rate_hz: trial.rate_hz(),
             columns: trial.channels.iter().map(column).collect(),
-            notes: notes.clone(),
+            notes: notes.iter().map(|note| in_page(note)).collect(),
         }
     }
 }
@@ -82,6 +86,8 @@ pub(crate) struct Files {
     set: Option<DataSet>,
     rigs: Vec<(String, RigFile)>,
     recordings: Vec<(String, Recording)>,
+    /// The calibration file that was read last.
+    record: Option<(String, GaugeCalibration)>,
     /// Names of recordings used only for testing, if there is no `dataset.toml`.
     held: Vec<String>,
 }
@@ -93,23 +99,52 @@ impl Files {
             return self.take_toml(name, bytes);
         }
         if name.ends_with(".json") {
-            let record = calibration_from_json(text(name, bytes)?, name)?;
-            return Ok(Read::Record {
-                name: name.to_owned(),
-                signal: record.spec().signal.as_str().to_owned(),
-                reference: record.spec().reference.as_str().to_owned(),
-                rate_hz: record.spec().sample_rate_hz.hz(),
-            });
+            return self.take_record(name, text(name, bytes)?);
         }
         let entry = self.set.iter().flat_map(|set| &set.trials).find(|entry| entry.file == name);
         let recording = match entry {
-            Some(entry) => Recording::of_bytes(entry, bytes, &asked.options())?,
-            None => Recording::from_reader(bytes, name, &asked.options())?,
+            Some(entry) => Recording::of_bytes(entry, bytes, &asked.options()?)?,
+            None => Recording::from_reader(bytes, name, &asked.options()?)?,
         };
         let about = About::of(name, &recording);
         self.recordings.retain(|(other, _)| other != name);
         self.recordings.push((name.to_owned(), recording));
         Ok(Read::Recording(about))
+    }
+
+    fn take_record(&mut self, name: &str, text: &str) -> Result<Read, Said> {
+        let gauge = GaugeCalibration::from_json(text, name)?;
+        let spec = gauge.calibration().spec();
+        let read = Read::Record {
+            name: name.to_owned(),
+            signal: spec.signal.as_str().to_owned(),
+            reference: spec.reference.as_str().to_owned(),
+            rate_hz: spec.sample_rate_hz.hz(),
+        };
+        self.record = Some((name.trim_end_matches(".json").to_owned(), gauge));
+        Ok(read)
+    }
+
+    /// Returns the calibration file that was read last, with its name.
+    pub(crate) fn record(&self) -> Result<&(String, GaugeCalibration), Said> {
+        let none = || Said("there is no calibration file: drop one".to_owned());
+        self.record.as_ref().ok_or_else(none)
+    }
+
+    /// Returns the trials on which a calibration file is evaluated: the test trials of a
+    /// `dataset.toml`, otherwise all recordings.
+    pub(crate) fn evaluated(&self) -> Result<Vec<Trial>, Said> {
+        match self.set {
+            Some(_) => self.trials(Split::Test),
+            None => Ok(self.session()?.into_iter().map(|one| one.trial).collect()),
+        }
+    }
+
+    /// Returns a recording by its name.
+    pub(crate) fn recording(&self, name: &str) -> Result<&Trial, Said> {
+        let found = self.recordings.iter().find(|(own, _)| own == name);
+        let none = || Said(format!("{name}: there is no recording with this name"));
+        found.map(|(_, recording)| &recording.trial).ok_or_else(none)
     }
 
     fn take_toml(&mut self, name: &str, bytes: &[u8]) -> Result<Read, Said> {
@@ -126,7 +161,7 @@ impl Files {
             return Ok(Read::DataSet { name: name.to_owned(), trials });
         }
         let rig = RigFile::parse(name, text)?;
-        let gauge = rig.kind.as_deref() == Some("gauge");
+        let gauge = is_gauge(&rig);
         self.rigs.retain(|(other, _)| other != name);
         self.rigs.push((name.to_owned(), rig));
         Ok(Read::Rig { name: name.to_owned(), gauge })
@@ -142,16 +177,40 @@ impl Files {
         }
     }
 
-    /// Returns the rig file that the data set names.
-    pub(crate) fn rig(&self) -> Result<Option<&RigFile>, Said> {
-        let Some(name) = self.set.as_ref().and_then(|set| set.rig.as_ref()) else {
-            return Ok(None);
-        };
-        let found = self.rigs.iter().find(|(own, _)| own == name).map(|(_, rig)| rig);
-        match found {
-            Some(rig) => Ok(Some(rig)),
-            None => Err(missing(name)),
+    /// Returns the rig file with which a diagnosis of the whole rig, or of the gauge `alone`, begins: the one that
+    /// `dataset.toml` names, otherwise the last one of this kind that was read.
+    pub(crate) fn rig(&self, alone: bool) -> Result<Option<&RigFile>, Said> {
+        if let Some(name) = self.rig_of_set() {
+            let named = self.rigs.iter().find(|(own, _)| own == name);
+            let (_, rig) = named.ok_or_else(|| missing(name))?;
+            if !alone || is_gauge(rig) {
+                return Ok(Some(rig));
+            }
         }
+        let mut rigs = self.rigs.iter().rev().map(|(_, rig)| rig);
+        Ok(rigs.find(|rig| is_gauge(rig) == alone))
+    }
+
+    fn rig_of_set(&self) -> Option<&String> {
+        self.set.as_ref().and_then(|set| set.rig.as_ref())
+    }
+
+    /// Returns a sentence for each rig file: whether a diagnosis uses it.
+    pub(crate) fn rig_notes(&self) -> Vec<String> {
+        let note = |(name, rig): &(String, RigFile)| {
+            let alone = is_gauge(rig);
+            match (self.rig(alone), self.rig_of_set()) {
+                (Ok(Some(used)), _) if std::ptr::eq(used, rig) => {
+                    let what = if alone { "the gauge alone" } else { "the whole rig" };
+                    format!("{name}: a diagnosis of {what} begins with this rig file")
+                }
+                (_, Some(own)) => {
+                    format!("{name}: it is not used, because dataset.toml names the rig file {own}")
+                }
+                _ => format!("{name}: it is not used, because another rig file was read after it"),
+            }
+        };
+        self.rigs.iter().map(note).collect()
     }
 
     /// Returns all trials: those listed in `dataset.toml`, otherwise all recordings.
@@ -186,14 +245,17 @@ impl Files {
     /// Returns at most `most` evenly spaced rows of a recording, as a flat list of time and two
     /// columns.
     pub(crate) fn points(&self, name: &str, columns: [&str; 2], most: usize) -> Vec<f64> {
-        let found = self.recordings.iter().find(|(own, _)| own == name);
-        let Some(trial) = found.map(|(_, recording)| &recording.trial) else { return Vec::new() };
+        let Ok(trial) = self.recording(name) else { return Vec::new() };
         let [a, b] = columns.map(|column| trial.channel(column).unwrap_or(&[]));
         let at = |column: &[f64], i: usize| column.get(i).copied().unwrap_or(f64::NAN);
         let step = trial.len().div_ceil(most.max(1)).max(1);
         let rows = (0..trial.len()).step_by(step);
         rows.flat_map(|i| [trial.time_s[i], at(a, i), at(b, i)]).collect()
     }
+}
+
+fn is_gauge(rig: &RigFile) -> bool {
+    rig.kind.as_deref() == Some("gauge")
 }
 
 fn missing(file: &str) -> Said {

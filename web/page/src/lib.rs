@@ -5,6 +5,7 @@
 
 mod calibration;
 mod diagnosis;
+mod evaluation;
 mod files;
 mod golden;
 mod live;
@@ -55,6 +56,14 @@ impl Desk {
     pub fn read(&mut self, name: &str, bytes: &[u8], asked: &str) -> Result<String, JsError> {
         let asked: Asked = from_json(asked)?;
         Ok(to_json(&self.files.take(name, bytes, &asked)?)?)
+    }
+
+    /// Returns a JSON list of sentences: which rig files a diagnosis uses.
+    ///
+    /// # Errors
+    /// Never in a correct build.
+    pub fn rig_notes(&self) -> Result<String, JsError> {
+        Ok(to_json(&self.files.rig_notes())?)
     }
 
     /// Reserves the recordings with these names, a JSON list, for testing. Without effect if there
@@ -118,6 +127,23 @@ impl Desk {
     pub fn evaluate(&mut self) -> Result<String, JsError> {
         let made = self.made.as_mut().ok_or_else(nothing)?;
         Ok(to_json(made.judged(&self.files)?)?)
+    }
+
+    /// Returns the errors of the calibration file that was read last, as `stretch evaluate` does.
+    ///
+    /// # Errors
+    /// Errors of the evaluation, as in the program.
+    pub fn evaluate_record(&self) -> Result<String, JsError> {
+        Ok(to_json(&evaluation::evaluate_record(&self.files)?)?)
+    }
+
+    /// Returns the estimates of a recording with the calibration file that was read last, as written by `stretch apply`,
+    /// and doubts about them.
+    ///
+    /// # Errors
+    /// Errors of the program.
+    pub fn estimates(&self, name: &str) -> Result<String, JsError> {
+        Ok(to_json(&evaluation::estimates(&self.files, name)?)?)
     }
 
     /// Returns the calibration file, as written by `stretch calibrate --out`.

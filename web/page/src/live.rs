@@ -15,7 +15,7 @@ use stretch_receptor::{
 };
 use wasm_bindgen::prelude::*;
 
-use crate::said::Said;
+use crate::said::{Said, in_page};
 
 /// Longest line of numbers, bytes.
 const LONGEST: usize = 256;
@@ -64,8 +64,7 @@ impl Live {
     }
 
     fn of(source: Source, calibration: Option<Calibration>) -> Self {
-        let signal =
-            calibration.as_ref().map_or("bridge_v", |c| c.spec().signal.as_str()).to_owned();
+        let signal = calibration.as_ref().map_or("signal", |c| c.spec().signal.as_str()).to_owned();
         let unit = calibration.as_ref().map_or("", |c| c.spec().reference.unit()).to_owned();
         let reference = calibration.as_ref().map_or("reference", |c| c.spec().reference.as_str());
         let reference = reference.to_owned();
@@ -130,7 +129,7 @@ impl Live {
             _ => None,
         };
         let doubts = applied.into_iter().flat_map(|a| a.pace.iter().cloned().chain(a.seen.doubt()));
-        doubts.map(|doubt| format!("{doubt}\n")).collect()
+        doubts.map(|doubt| format!("{}\n", in_page(&doubt.text))).collect()
     }
 }
 

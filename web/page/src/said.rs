@@ -3,6 +3,24 @@
 use std::{error::Error, fmt};
 
 use serde::{Serialize, de::DeserializeOwned};
+use stretch_data::rename_options;
+
+/// Options of the program, and the fields of the page with the same meaning.
+const FIELDS: [(&str, &str); 7] = [
+    ("adc", "“Bits, signal at code 0, signal at the last code”"),
+    ("columns", "“Column names”"),
+    ("model", "“Model”"),
+    ("reference", "“Reference”"),
+    ("sample-rate", "“Samples per second”"),
+    ("signal", "“Signal”"),
+    ("time", "“Time column”"),
+];
+
+/// Writes options of the program as fields of the page: `--time COLUMN:ms` becomes `“Time column” COLUMN:ms`. A command
+/// that remains is one of the program.
+pub(crate) fn in_page(text: &str) -> String {
+    rename_options(text, &FIELDS).replace("stretch convert", "the program: stretch convert")
+}
 
 /// An error as one sentence that states the problem, its place, and the remedy.
 #[derive(Debug)]
@@ -16,7 +34,7 @@ impl fmt::Display for Said {
 
 impl From<Said> for wasm_bindgen::JsError {
     fn from(said: Said) -> Self {
-        Self::new(&said.0)
+        Self::new(&in_page(&said.0))
     }
 }
 

@@ -99,7 +99,7 @@ const page = {
       choice.value = state.held.has(name) ? "test" : "fit";
       choice.onchange = () => {
         choice.value === "test" ? state.held.add(name) : state.held.delete(name);
-        page.changed("calibrated", "diagnosed");
+        page.changed("calibrated", "diagnosed", "evaluated");
       };
       cell.append(choice);
     }

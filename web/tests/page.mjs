@@ -249,6 +249,11 @@ const used = async () => {
   const estimates = await saved(page, "save-estimates");
   check(estimates.name === "estimate.csv" && estimates.text === text(join(wanted, "estimate.csv")), "its estimates are the program's");
   check(await page.inputValue("#line-rate") === "100", "live lines have its rate");
+  await put(page, [join(bench, "inflation_50.csv")]);
+  await page.getByLabel("use of inflation_50.csv").selectOption("test");
+  check(await page.locator("#evaluated.stale").count() === 1, "its errors are greyed");
+  await press(page, "evaluate");
+  check((await page.innerText("#record-judged-on")).startsWith("Judged on inflation_50.csv."), `a test is enough: ${await page.innerText("#record-judged-on")}`);
   await put(page, ["nominal.toml", "dataset.toml"].map((name) => join(bench, name)));
   await put(page, [{ name: "fixed.toml", mimeType: "text/plain", buffer: readFileSync(join(bench, "nominal.toml")) }]);
   const notes = await page.innerText("#notes");

@@ -131,13 +131,13 @@ impl Files {
         self.record.as_ref().ok_or_else(none)
     }
 
-    /// Returns the trials on which a calibration file is evaluated: the test trials of a
-    /// `dataset.toml`, otherwise all recordings.
+    /// Returns the trials on which a calibration file is evaluated: those used only for testing, or all recordings if
+    /// nothing says which these are.
     pub(crate) fn evaluated(&self) -> Result<Vec<Trial>, Said> {
-        match self.set {
-            Some(_) => self.trials(Split::Test),
-            None => Ok(self.session()?.into_iter().map(|one| one.trial).collect()),
+        if self.set.is_some() || !self.held.is_empty() {
+            return self.trials(Split::Test);
         }
+        Ok(self.session()?.into_iter().map(|one| one.trial).collect())
     }
 
     /// Returns a recording by its name.

@@ -222,7 +222,7 @@ pub(crate) static CHANNEL_SKEW: Effect = Effect {
     name: "channel_skew",
     title: "the time offset between signal and reference",
     words: "the signal is sampled earlier or later than the reference",
-    equation: "bridge samples show the length of skew_s + rate t earlier, t since the trial began, first and last value held",
+    equation: "the signal shows the reference of skew_s + rate t earlier, t since the trial began, first and last value held",
     parameters: &[
         EffectParameter::strength("skew_s", "s", -0.1, 0.2, 0.02),
         EffectParameter::form("rate", "s/s", -5e-4, 5e-4, Form { neutral: 0.0, usual: 0.0 }),

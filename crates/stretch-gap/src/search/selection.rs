@@ -279,7 +279,9 @@ impl<'a> Search<'a> {
         let deviating = self.acceptance.deviating(best)?;
         let base = (best, &deviating);
         let list = self.shortlist(base, screened, kept);
-        progress(&format!("fitting effects, round {round}: {}", list.len()));
+        if !list.is_empty() {
+            progress(&format!("fitting effects, round {round}: {}", list.len()));
+        }
         let next = self.first_accepted(base, ground, &list)?;
         let is_open = self.problem.gap(best) > self.acceptance.thresholds.null_excess;
         if next.is_some() || !is_open || !self.is_thorough || self.problem.is_spent() {

@@ -344,6 +344,13 @@ fn every_answer_has_its_words() {
         text.extend(told.notes.iter().map(|note| format!("note: {note}\n")));
         text.push('\n');
         values.insert(name.into(), json!(told.answer));
+        if let Some(Answer::Unknown { .. }) = told.answer {
+            let early =
+                Diagnosis { cut_short: Some(names(&[PLAY, LAG])), none_examined: true, ..told };
+            let said = early.headline();
+            let begins = "The budget of runs was spent before any effect could be examined. There is a gap in ";
+            assert!(said.starts_with(begins) && !said.contains("none of the examined"), "{said}");
+        }
     }
     for rest in [&[][..], &["lag"], &["a", "b", "c", "d", "e", "f", "g", "h"]] {
         let cut = Diagnosis { cut_short: Some(names(rest)), ..plain.clone() };

@@ -96,9 +96,10 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
         }
         (method, _) => method.to_owned(),
     };
-    // The chosen calibration alone: another one may be better on these recordings by chance.
-    let chosen = calibrated.last().and_then(|(name, _)| {
-        let at = methods.iter().position(|m| m.method == *name)?;
+    // The chosen calibration, although another one may be better on these recordings by chance.
+    let last =
+        calibrated.last().and_then(|(name, _)| methods.iter().position(|m| m.method == *name));
+    let chosen = last.or_else(|| best(methods)).and_then(|at| {
         let raw = methods.iter().filter(|m| m.method == RAW);
         let two: Vec<MethodErrors> = raw.chain([&methods[at]]).cloned().collect();
         errors_in_words(&two, &evaluation.unit, |_| called(at))

@@ -142,7 +142,9 @@ fn renew(args: RenewArgs) -> anyhow::Result<()> {
     let options =
         RenewOptions { signals: signals.clone(), calibration, ..RenewOptions::of(&args.of) };
     let renewed = prior.renew(&trials, &options).map_err(|error| match &args.calibration {
-        Some(path) if matches!(error, SleeveError::OtherPrior) => of_files(error, &[path.clone()]),
+        Some(path) if matches!(error, SleeveError::OtherPrior) => {
+            of_files(error, std::slice::from_ref(path))
+        }
         _ => of_files(error, &args.trials),
     })?;
     let mut outputs = Outputs::default();

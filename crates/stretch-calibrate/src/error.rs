@@ -255,7 +255,7 @@ impl CalibrateError {
     ///
     /// ```
     /// let error = stretch_calibrate::CalibrateError::too_few_to_judge(&[]);
-    /// assert!(error.to_string().starts_with("0 samples are too few to leave some out of the fit"));
+    /// assert!(error.to_string().starts_with("0 samples are too few"));
     /// ```
     pub fn too_few_to_judge(trials: &[Trial]) -> Self {
         Self::TooFewToJudge { samples: trials.iter().map(Trial::len).sum() }

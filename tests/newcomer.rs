@@ -200,7 +200,8 @@ fn a_reference_that_is_off_throughout_is_remarked_on_with_what_to_do() {
         scratch.write(name, format!("time_s,length_mm,bridge_v\n{rows}"))
     };
     // In centimetres, and on a mount that has moved by 10 mm.
-    let members: [(&str, fn(f64) -> f64, &str); 3] = [
+    type Member = (&'static str, fn(f64) -> f64, &'static str);
+    let members: [Member; 3] = [
         ("centimetres.csv", |mm| mm / 10.0, "--column 'length_mm=length_mm*10'"),
         ("moved.csv", |mm| mm + 10.0, "it is 10 mm below the reference on average"),
         ("moved_a_little.csv", |mm| mm - 2.0, "it is 2 mm above the reference on average"),

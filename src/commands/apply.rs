@@ -264,7 +264,7 @@ impl ZeroWatch {
             };
             doubt(format!(
                 "{}the zero has shifted by {} since {:.2} s, across a pause: at most {} is usual {basis}. If the sensor was put \
-                 on again, calibrate again",
+                 on again, calibrate again; if the movements only end elsewhere now, nothing is wrong",
                 self.trial,
                 with_unit(zero.off_reference.abs(), &self.unit),
                 time_s - f64::from(zero.since_samples) * self.period_s,

@@ -316,7 +316,7 @@ fn meant(given: &str, known: &[&str]) -> String {
         .map_or(String::new(), |one| format!(" (did you mean {one}?)"))
 }
 
-/// Returns serde's description of what it expects in plain words.
+/// Translates serde's description of an expected value into plain words.
 fn words(expected: &dyn Expected) -> String {
     let expected = expected.to_string();
     match expected.as_str() {

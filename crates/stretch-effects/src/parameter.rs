@@ -34,7 +34,7 @@ pub enum Role {
     /// One of a few values (50 or 60 Hz). The diagnosis tries the values in the starting points of the search and none
     /// between them.
     Choice,
-    /// A number that only a recording contains (the phase of a hum). It is not part of the result of a diagnosis.
+    /// A number that is estimated from each recording (the phase of a hum). It is not part of the result of a diagnosis.
     Found {
         /// Value that is used if there is no recording.
         stand_in: f64,

@@ -12,9 +12,9 @@ mod sealed {
         const LARGEST: i128;
         const LARGEST_SUM: i128;
         fn widen(self) -> Self::Sum;
-        /// Returns `sum + other - choose old`, wrapping.
+        /// Returns `sum + other - choose * old`, wrapping.
         fn slide(sum: Self::Sum, other: Self::Sum, choose: i32, old: Self) -> Self::Sum;
-        /// Returns `total + weight sum`, wrapping.
+        /// Returns `total + weight * sum`, wrapping.
         fn weigh(total: i64, weight: i32, sum: Self::Sum) -> i64;
     }
 

@@ -83,7 +83,8 @@ pub struct Diagnosed<T> {
     pub low: T,
     /// The greatest target.
     pub high: T,
-    /// Seconds by which the estimate is ahead of the signal, shortened because the rate decays.
+    /// Seconds over which the estimate is extrapolated at its rate. They are fewer than the lag that they compensate,
+    /// because the modelled rate decays.
     pub ahead_s: T,
     /// Factor from the filter's standard deviation to the one that is reported, in reference units.
     pub spread: T,

@@ -48,7 +48,7 @@ pub(crate) struct Shown {
     pub(crate) name: String,
     /// Indices of the trial's samples in the concatenation of all trials.
     pub(crate) samples: Range<usize>,
-    /// Times of these samples, s.
+    /// Times of `samples`, s.
     pub(crate) time_s: Vec<f64>,
     /// The time window that is shown first, s.
     pub(crate) window: Range<f64>,

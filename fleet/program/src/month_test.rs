@@ -63,7 +63,7 @@ pub(crate) fn compare(first: &[Day], second: &[Day]) -> Result<Compared, String>
     };
     let (a, b) = (scores(first)?, scores(second)?);
     let moved: DVector<f64> = a.iter().sum();
-    let undetermined = || "one of the months does not determine the surfaces by itself".to_owned();
+    let undetermined = || "the data of one month alone do not determine the calibration".to_owned();
     let inverse = (&share * &rest).try_inverse().ok_or_else(undetermined)?;
     let apart = &inverse * &moved;
     let q = moved.dot(&apart);

@@ -26,7 +26,7 @@ const TELLING: usize = 50;
 
 /// Greatest number of trials with which each trial is compared. If there are more, they are chosen evenly.
 const OTHERS: usize = 32;
-/// Number of neighbours, in the order of the mean reference, with which each trial is compared to find copies.
+/// To find copies, trials are sorted by their mean reference, and each is compared with this many neighbours.
 const NEXT: usize = 8;
 
 /// A possible mistake in one trial, as a function and a message. The function takes the line of this trial and the line

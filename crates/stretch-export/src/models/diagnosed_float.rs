@@ -65,7 +65,11 @@ fn filter(constants: &mut Constants, model: &Diagnosed<f32>) {
         .define("DRIVE_LOW", curve.low, "the drive of the first knot")
         .define("DRIVE_STEP", curve.step, "distance of knots")
         .define("PER_STEP", curve.per_step, "1 / DRIVE_STEP")
-        .define("LEAST_RUN", LEAST_RUN as f32 * curve.step, "least drive change of a secant")
+        .define(
+            "LEAST_RUN",
+            LEAST_RUN as f32 * curve.step,
+            "smallest change of the drive for which a secant is computed",
+        )
         .define("LEAST_ANSWER", LEAST_ANSWER as f32, "least slope of the drive over the target")
         .define("KEPT", model.kept, "share of the rate kept per sample")
         .define("KEPT_TWICE", model.kept_twice, "the same squared")

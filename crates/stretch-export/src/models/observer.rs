@@ -89,7 +89,11 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
         .define("DRIVE_LOW", o.drive_low, "the drive of the first knot")
         .define("DRIVE_STEP", o.drive_step, "distance of knots")
         .define("PER_STEP", o.per_step, "1 / DRIVE_STEP")
-        .define("LEAST_RUN", LEAST_RUN * o.drive_step, "least drive change of a secant");
+        .define(
+            "LEAST_RUN",
+            LEAST_RUN * o.drive_step,
+            "smallest change of the drive for which a secant is computed",
+        );
     constants.define("LEAD_S", o.lead_s, "seconds by which the signal leads");
     define_memory(
         &mut constants,
@@ -142,7 +146,7 @@ pub(super) fn define_rest<L: Literal>(constants: &mut Constants, at_rest: L, res
         .define("AT_REST", at_rest, "signal at rest, with settled memory")
         .define("REST_LEVEL", level, "signal at rest in the calibration")
         .define("REST_PULL", pull, "share of a negative excess that is followed")
-        .define("REST_LEAK", leak, "rise of the baseline otherwise")
+        .define("REST_LEAK", leak, "rise of the baseline per sample if the excess is not negative")
         .define("REST_AVERAGE", average, "share of a sample in the running average")
         .define("REST_MOST", most, "largest excess that counts")
         .define("REST_FURTHEST", furthest, "largest size of the baseline");

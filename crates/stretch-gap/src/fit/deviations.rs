@@ -3,8 +3,8 @@
 //! further effect.
 //!
 //! Let d be the contribution of an effect to an output, in multiples of the noise: the residual
-//! without the effect minus the residual with it. A real effect of the same kind may have further
-//! poles and a differently bent curve. To first order it contributes
+//! without the effect minus the residual with it. The real effect may have more poles than the form in
+//! the catalogue, and a curve of another shape. To first order it contributes
 //!
 //! ```text
 //! d + sum_j c_j b_j,     b = d - L d with lags L of 3, 30 and 300 samples;  z d and (z^2 - 1/3) d,     c_j ~ N(0, s^2)

@@ -258,7 +258,7 @@ impl Shapes {
     }
 
     /// Returns the most probable of three hypotheses: the stated level, white noise, and white plus
-    /// slow noise. They have 0, 1 and 3 parameters. The most probable has the largest L -
+    /// slow noise, with 0, 1 and 3 parameters. The most probable has the largest L -
     /// (parameters/2) ln(observations) (Schwarz 1978, doi 10.1214/aos/1176344136).
     fn fit(&self, powers: &[f64], windows: usize, stated: Option<f64>) -> Noise {
         let n = windows as f64;

@@ -88,7 +88,7 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         Ok(bench)
     }
 
-    /// Returns the most promising size of one error, with the reduction that it promises. `None` if
+    /// Returns the most promising size of one error, with the reduction of the gap that it promises. `None` if
     /// no size is tried or none can be simulated.
     pub(crate) fn look(&self, fault: usize) -> Result<Option<Promising>, GapError> {
         let one = &self.suspect.faults()[fault];

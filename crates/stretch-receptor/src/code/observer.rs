@@ -50,7 +50,7 @@ pub struct IntegerObserver {
     pub numbers: ObserverNumbers,
     /// Change of the position on the curve per unit of signal in each segment, times `2^recip_bits`.
     pub recips: [i32; KNOTS],
-    /// Bits behind the point of `recips`.
+    /// Number of fractional bits of `recips`.
     pub recip_bits: u32,
     /// Index of the gains for each segment's slope.
     pub tangents: [u8; KNOTS],

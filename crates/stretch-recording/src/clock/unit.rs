@@ -9,7 +9,7 @@ use crate::{
 
 /// Accepted sample rates, Hz, if an option gives the unit or the rate.
 pub(crate) const RATES_HZ: RangeInclusive<f64> = 1e-3..=1e7;
-/// Accepted sample rates, Hz, without such an option. A stretch sensor is not sampled at megahertz.
+/// Accepted sample rates, Hz, if no option gives the unit or the rate. A stretch sensor is not sampled at megahertz.
 const USUAL_HZ: RangeInclusive<f64> = 1e-3..=1e6;
 /// Sample rates of nearly all recordings, Hz.
 const LIKELY_HZ: RangeInclusive<f64> = 0.5..=5e3;

@@ -155,7 +155,7 @@ pub struct Held {
 pub struct Setting<'a> {
     /// Length, mm.
     pub length_mm: &'a [f64],
-    /// Share by which a shunt lowers the trim of the bridge; empty without one.
+    /// Share by which a shunt lowers the trim of the bridge, by sample; empty if there is no shunt.
     pub shunt: &'a [f64],
 }
 

@@ -429,7 +429,7 @@ impl Pneumatics {
     }
 
     /// Ends a step in which the chamber follows a recovering supply. The chamber ends in equilibrium with the supply,
-    /// and the mean flow follows from the mass gained. Supply and chamber are matched by iteration.
+    /// and the mean flow follows from the mass gained. An iteration finds the common pressure.
     #[cold]
     fn settle<const D: usize>(
         &self,

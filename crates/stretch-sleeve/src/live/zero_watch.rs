@@ -126,7 +126,7 @@ impl<T: Real> TurnFinder<T> {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ZeroWatch<T> {
-    /// Detector of movements in the signal times `sign`.
+    /// Detector of movements in the product of `sign` and the signal.
     pub finder: TurnFinder<T>,
     /// -1 if the signal falls when the target rises, otherwise 1.
     pub sign: T,

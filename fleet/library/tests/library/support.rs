@@ -17,7 +17,7 @@ use datafusion::{
 };
 use stretch_fleet::{RATE_ESTIMATOR_KEY, SAMPLE_RATE_KEY};
 
-/// Relative rounding error, which depends on the order in which triangles are merged. The fits in
+/// Relative rounding error, which depends on the order in which the triangular factors are merged. The fits in
 /// these tests are well conditioned.
 pub(crate) const ROUNDING: f64 = 1e-12;
 

@@ -168,7 +168,7 @@ impl Footer {
         let pair = pairs.into_iter().flatten().find(|pair| pair.key == KEY);
         let Some(text) = pair.and_then(|pair| pair.value.as_ref()) else {
             bail!(
-                "its footer does not describe a trial, so that it is not a file of a lake; ingest the trial"
+                "the file is not part of a lake, because its footer does not describe a trial; ingest the recording"
             );
         };
         serde_json::from_str(text).context("its footer cannot be read")

@@ -264,7 +264,7 @@ fn a_folder_that_exists_and_a_newer_record_are_refused() {
     let out = scratch.path("c");
     fs::create_dir(&out).unwrap();
     fs::write(out.join("stretch.h"), "mine").unwrap();
-    fails(&mut export(&calibration, &out), &["it exists", "nothing is overwritten"]);
+    fails(&mut export(&calibration, &out), &["this folder exists", "nothing is overwritten"]);
     assert_eq!(fs::read_to_string(out.join("stretch.h")).unwrap(), "mine");
 
     let newer =

@@ -92,7 +92,7 @@ fn folders_that_hold_something_are_refused_and_replaced_when_forced() {
     {
         fails(&mut said(line), &["bench", "it exists", "--force", "other files are kept"]);
     }
-    fails(&mut said("export --calibration board.json --c bench"), &["bench", "it exists"]);
+    fails(&mut said("export --calibration board.json --c bench"), &["bench", "exists"]);
     assert!(tree(&scratch.path("")) == before);
     runs(&mut said("simulate --protocol pulses --out bench --force"));
     let after = tree(&scratch.path("bench"));

@@ -516,7 +516,9 @@ fn report(
     notes.extend(not_fitted_note(&not_fitted));
     notes.extend(friction_note(simulator, &naming.named));
     let identifiability = searched.problem.identified();
-    notes.extend(dead_parameters_note(&identifiability));
+    // A rig's parameters are known to act; a program of the user may ignore what it receives.
+    let is_program = simulator.model_runs().is_some();
+    notes.extend(dead_parameters_note(&identifiability).filter(|_| is_program));
     notes.extend(spent.map(Note::from));
     let no_name = is_quiet.then(|| detection_limit_note(&detection_limits, simulator.effects()));
     notes.extend(no_name.flatten());

@@ -77,7 +77,7 @@ type Doubtful = (usize, fn(f64, &[f64], u64) -> Vec<f64>, bool, &'static [&'stat
 
 const REFUSED: [&str; 2] = [
     "stage spring: the simulator answers the same question differently, ",
-    " in row 1234 of trial spring.csv; seed its random numbers, and begin every run from the same state",
+    " in row 1234 of spring.csv; seed its random numbers, and begin every run from the same state",
 ];
 
 const DOUBTFUL: [Doubtful; 7] = [
@@ -90,7 +90,7 @@ const DOUBTFUL: [Doubtful; 7] = [
             sound(compliance, force).iter().map(|y| y + 1e-6 * run as f64).collect()
         },
         true,
-        &["in row 0 of trial"],
+        &["in row 0 of spring.csv"],
     ),
     // an offset that depends on how long the run is
     (
@@ -100,7 +100,7 @@ const DOUBTFUL: [Doubtful; 7] = [
             sound(compliance, force).iter().map(|y| y + offset).collect()
         },
         false,
-        &["the same rows differently in runs over", "row 0 of trial spring.csv; let no sample"],
+        &["the same rows differently in runs over", "row 0 of spring.csv; let no sample"],
     ),
     (
         1,

@@ -153,7 +153,7 @@ impl GapError {
     /// assert!(beyond.is_of_runs());
     /// assert_eq!(
     ///     beyond.to_string(),
-    ///     "arm: the simulation gave 1e160 at 1.5 s of trial a.csv, which is no output of a machine"
+    ///     "arm: the simulation gave 1e160 at 1.5 s of a.csv, which is no output of a machine"
     /// );
     /// ```
     pub fn is_of_runs(&self) -> bool {

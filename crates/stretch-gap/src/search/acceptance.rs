@@ -3,12 +3,10 @@
 //! 1. The effect closes at least the share `share` of the gap that is left in its stages.
 //! 2. The score, and the likelihood by [octaves](crate::fit::octaves) of frequency, both rise by
 //!    `rise` nats.
-//! 3. An effect that closes less than `null_excess` is added only if the score rises by
-//!    `faint_rise`.
-//! 4. The effects of the smaller set may leave up to the share `model_discrepancy` of what they
+//! 3. The effects of the smaller set may leave up to the share `model_discrepancy` of what they
 //!    close, because their forms differ from those of the rig. An effect that closes no more than
-//!    that must close most of what is left, and the score or the likelihood by octaves must rise by
-//!    `faint_rise`.
+//!    that, or less than `null_excess`, is added only if the score rises by `faint_rise`. If it
+//!    closes no more than that, it must also close most of what is left.
 //!
 //! The criteria must also hold if [deviations](crate::fit::deviations) from the usual forms of the
 //! effects are added to both sets. What a deviation explains is not evidence for a further effect.
@@ -57,12 +55,12 @@ impl Acceptance<'_> {
         let all = 0..base.misfits.len();
         let closed: f64 = all.map(|stage| self.problem.closes(base, next, stage)).sum();
         let is_beyond = self.exceeds_discrepancy(base, next, new);
-        let (risen, octaves) = (next.score - base.score, self.problem.rise(base, next));
-        let is_strong = is_beyond || risen.max(octaves) > self.thresholds.faint_rise;
-        let of_left = if is_beyond { share } else { MOST };
-        is_strong
-            && risen > self.least_rise(closed)
-            && octaves > rise
+        let (least, of_left) = match is_beyond {
+            true => (self.least_rise(closed), share),
+            false => (self.thresholds.faint_rise, MOST),
+        };
+        next.score - base.score > least
+            && self.problem.rise(base, next) > rise
             && closed >= of_left * self.left(base, new)
     }
 

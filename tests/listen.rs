@@ -20,7 +20,7 @@ use rustix::{
 use stretch_calibrate::{
     BoardReceptor, ModelKind, calibration_to_json, fixed_record, read_calibration,
 };
-use stretch_core::{Calibration, Runner, Volts};
+use stretch_core::{Calibration, Runner, Target, Volts};
 use stretch_link::Frame;
 use stretch_receptor::{
     Receptor, Withheld,
@@ -152,24 +152,19 @@ impl Listener {
     }
 }
 
-/// Returns the expected rows of a recording of these frames, without the time.
-fn rows<'a>(frames: impl IntoIterator<Item = &'a Frame>) -> Vec<String> {
-    use stretch_link::Answer;
-    let target = example_calibration().spec().target;
+/// Returns the expected rows of a recording of these frames, without the time. A record in integers
+/// has no target.
+fn rows<'a>(frames: impl IntoIterator<Item = &'a Frame>, target: Option<Target>) -> Vec<String> {
     let row = |frame: &Frame| {
         let volts = due().volts(AdcCode(frame.code)).unwrap();
-        match frame.answer {
-            Answer::Reading { thousandths, branch, domain } => format!(
-                "{volts},{},{}.{:03},{},{domain}",
-                frame.code,
-                thousandths / 1000,
-                thousandths % 1000,
-                target.branch_name(branch)
-            ),
-            _ => format!("{volts},{},,,warming", frame.code),
-        }
+        format!("{volts},{},{}", frame.code, frame.answer.cells(target))
     };
     frames.into_iter().filter(|frame| frame.code >= 0).map(row).collect()
+}
+
+/// The target of [`example_calibration`].
+fn length() -> Option<Target> {
+    Some(example_calibration().spec().target)
 }
 
 fn without_time(recorded: &str) -> Vec<String> {
@@ -185,7 +180,7 @@ fn a_clean_line_is_recorded_sample_by_sample() {
     listener.await_rows(297);
     let (status, notes, recorded) = listener.stop();
     assert!(status.success(), "{notes}");
-    assert_eq!(without_time(&recorded), rows(&frames));
+    assert_eq!(without_time(&recorded), rows(&frames, length()));
     assert!(recorded.starts_with("time_s,bridge_v,adc_code,estimate_mm,branch,domain\n0,"));
     assert!(recorded.contains("\n2.99,"), "the board's clock");
     assert!(notes.contains("300 frames, 0 lost, 0 damaged, 0 repeated, 0 restarts"), "{notes}");
@@ -198,13 +193,13 @@ fn a_clean_line_is_recorded_sample_by_sample() {
 
 /// Listens to the frames with this calibration file. Returns the largest difference that is
 /// reported.
-fn difference(record: &[u8], frames: &[Frame], what: &str) -> f64 {
+fn difference(record: &[u8], (frames, target): (&[Frame], Option<Target>), what: &str) -> f64 {
     let (listener, mut master) = Listener::start_with(record);
     frames.iter().for_each(|frame| master.write_all(&line(frame)).unwrap());
-    listener.await_rows(rows(frames).len());
+    listener.await_rows(rows(frames, target).len());
     let (status, notes, recorded) = listener.stop();
     assert!(status.success(), "{what}: {notes}");
-    assert_eq!(without_time(&recorded), rows(frames), "{what}");
+    assert_eq!(without_time(&recorded), rows(frames, target), "{what}");
     assert!(notes.contains("300 frames, 0 lost"), "{what}: {notes}");
     let told = notes.split("from the calibration by up to ").nth(1).unwrap();
     told.split_whitespace().next().unwrap().parse().unwrap()
@@ -221,7 +216,8 @@ fn every_model_that_is_calibrated_is_listened_to() {
         let kind = kind.to_string();
         runs(calibrate(&trial, &out).args(["--model", &kind]));
         let calibration = read_calibration(&out).unwrap();
-        let told = difference(&fs::read(&out).unwrap(), &float_board(&calibration), &kind);
+        let told =
+            difference(&fs::read(&out).unwrap(), (&float_board(&calibration), length()), &kind);
         // The final rounding to a micrometre, and the rounding of `f32` on the board.
         let bound = 6e-4 + testkit::tolerance::REMEMBERING_F32_MM;
         assert!(told <= bound, "{kind}: {told} mm, bound {bound} mm");
@@ -229,7 +225,11 @@ fn every_model_that_is_calibrated_is_listened_to() {
         let Ok(fixed) = fixed_record(&calibration, &due()) else { continue };
         let mut receptor = BoardReceptor::new(&fixed.bytes).unwrap();
         let frames = frames(300, |code| receptor.step(code));
-        assert_eq!(difference(&fixed.bytes, &frames, &kind), 0.0, "{kind}: the same integers");
+        assert_eq!(
+            difference(&fixed.bytes, (&frames, None), &kind),
+            0.0,
+            "{kind}: the same integers"
+        );
         in_integers.push(kind);
     }
     assert_eq!(in_integers, ["linear", "poly13", "observer", "observer+rest"]);
@@ -307,13 +307,13 @@ fn a_last_frame_without_newline_and_a_block_that_comes_twice_are_counted() {
     let bytes: Vec<u8> = frames.iter().flat_map(line).collect();
     let (notes, recorded) = heard(&bytes[..bytes.len() - 1]);
     assert!(notes.contains("50 frames, 0 lost, 0 damaged") && notes.contains("50 rows"), "{notes}");
-    assert_eq!(without_time(&recorded), rows(&frames));
+    assert_eq!(without_time(&recorded), rows(&frames, length()));
     let (notes, _) = heard(&bytes[..bytes.len() - 5]);
     assert!(notes.contains("49 frames, 0 lost, 1 damaged"), "{notes}");
     let replayed = frames[..30].iter().chain(&frames[28..]).flat_map(line).collect::<Vec<u8>>();
     let (notes, recorded) = heard(&replayed);
     assert!(notes.contains("50 frames, 0 lost, 0 damaged, 2 repeated, 0 restarts"), "{notes}");
-    assert_eq!(without_time(&recorded), rows(&frames));
+    assert_eq!(without_time(&recorded), rows(&frames, length()));
 }
 
 #[test]
@@ -351,10 +351,10 @@ fn faults_lose_their_own_frames_and_no_others() {
         }
         master.write_all(&bytes).unwrap();
     }
-    listener.await_rows(rows(&kept).len());
+    listener.await_rows(rows(&kept, length()).len());
     let (status, notes, recorded) = listener.stop();
     assert!(status.success(), "{notes}");
-    assert_eq!(without_time(&recorded), rows(&kept));
+    assert_eq!(without_time(&recorded), rows(&kept, length()));
     // 340 of 400 frames arrive. Every lost one lies before the last one that arrived.
     assert!(notes.contains("340 frames, 60 lost, 100 damaged, 20 repeated, 0 restarts"), "{notes}");
 }
@@ -385,7 +385,7 @@ fn a_pulled_cable_and_a_board_that_restarts_lose_nothing_recorded() {
     let (status, notes, recorded) = listener.stop();
     assert!(status.success(), "{notes}");
     let kept = frames[..100].iter().chain(&frames[101..]).chain(&frames[..30]);
-    assert_eq!(without_time(&recorded), rows(kept));
+    assert_eq!(without_time(&recorded), rows(kept, length()));
     // The first half of that line may be lost with the cable.
     let damaged = if notes.contains("2 damaged") { 2 } else { 1 };
     let expected = format!("179 frames, 1 lost, {damaged} damaged, 0 repeated, 1 restarts");
@@ -400,7 +400,7 @@ fn killed_outright_it_leaves_every_whole_line() {
     listener.await_rows(119);
     listener.child.kill().unwrap();
     listener.child.wait().unwrap();
-    assert_eq!(without_time(&listener.recorded()), rows(&frames));
+    assert_eq!(without_time(&listener.recorded()), rows(&frames, length()));
 }
 
 #[test]
@@ -429,7 +429,7 @@ fn standard_input_ends_with_its_stream_and_a_record_is_never_overwritten() {
     let shown = String::from_utf8(output.stdout).unwrap();
     let recorded = fs::read_to_string(folder.path().join("trial.csv")).unwrap();
     assert_eq!(shown, recorded, "off a terminal the lines are those of the record");
-    assert_eq!(without_time(&shown), rows(&frames));
+    assert_eq!(without_time(&shown), rows(&frames, length()));
     let again = run("trial.csv");
     assert!(!again.status.success());
     assert!(String::from_utf8_lossy(&again.stderr).contains("trial.csv: cannot record there"));

@@ -92,7 +92,7 @@ def test_a_spreadsheet_is_refused_as_one(tmp_path):
     for path in sorted(tmp_path.iterdir()):
         what = {"ods": "OpenDocument", "zip": "ZIP"}.get(path.suffix[1:], "Excel")
         todo = "unpack it" if what == "ZIP" else "save the sheet as CSV"
-        words = rf"real\.\w+: this {what} file cannot be read: .*; {todo}"
+        words = rf"real\.\w+: this {what} file cannot be read: (.*; )?{todo}"
         with pytest.raises(stretch_gap.StretchError, match=words):
             stretch_gap.read(path)
         with pytest.raises(stretch_gap.StretchError, match=words):

@@ -128,7 +128,7 @@ pub fn choose_model_watched(
     choose_among(trials, options, judged).ok_or_else(|| {
         // A part without samples gives the error that there is no trial, which would mislead a user who named trials.
         let first = first.filter(|problem| !matches!(problem, CalibrateError::NoTrials));
-        first.unwrap_or(CalibrateError::TooFewToJudge { samples: rows })
+        first.unwrap_or_else(|| CalibrateError::too_few_to_judge(trials))
     })
 }
 

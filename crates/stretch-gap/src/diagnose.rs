@@ -310,18 +310,14 @@ fn doubt(
 
 /// Returns the detection limit of each effect; empty if effects are not examined or no more runs
 /// may be made.
-fn limits(
-    task: Task<'_>,
-    searched: &Searched<'_>,
-    null_band: f64,
-) -> Result<Vec<DetectionLimit>, GapError> {
+fn limits(task: Task<'_>, searched: &Searched<'_>) -> Result<Vec<DetectionLimit>, GapError> {
     let problem = &searched.problem;
     if !task.examines_effects || problem.is_spent() {
         return Ok(Vec::new());
     }
     (task.progress)("estimating detection limits");
     let (best, thresholds) = (&searched.found.best, &task.options.thresholds);
-    let inputs = LimitInputs { problem, best, thresholds, null_band, seed: task.options.seed };
+    let inputs = LimitInputs { problem, best, thresholds };
     Ok(if_possible(detection_limits(inputs, searched.looked.as_deref()))?.unwrap_or_default())
 }
 
@@ -451,7 +447,7 @@ fn report(
     let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, options.seed));
     let is_quiet = matches!(judged.kind, VerdictKind::NoGap | VerdictKind::Parameters);
     let detection_limits = match too_little.is_none() && (is_quiet || options.detection_limits) {
-        true => limits(task, searched, null_band)?,
+        true => limits(task, searched)?,
         false => Vec::new(),
     };
     let ambiguous = match is_quiet || judged.kind == VerdictKind::Record {

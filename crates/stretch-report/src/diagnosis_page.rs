@@ -392,8 +392,8 @@ fn detectable(page: &mut Page, d: &Diagnosis) {
     page.section(
         "What would have been seen",
         "An effect weaker than its limit may be present without being seen. A stronger effect would have been named nine times in ten. \
-         The limits come from linearised draws: a similar effect whose form is fitted may be named instead. An effect without a limit \
-         cannot be seen in these data, or cannot be distinguished from others.",
+         Between the two columns the gap is seen, but a similar effect may be named instead. An effect without a limit cannot be seen \
+         in these data.",
     );
     page.table(&limit_table(&d.detection_limits));
 }

@@ -184,27 +184,31 @@ pub(crate) fn slice_table(slices: &[SliceGap], stage: &str) -> Option<Table> {
     (!rows.is_empty()).then(|| Table::new(caption, &head, rows))
 }
 
-/// A table of the detection limits: the strength at which each effect would be named, with the parameter that measures
-/// it.
+/// A table of the detection limits: the strengths at which each effect would be seen and named, with the parameter that
+/// measures it.
 ///
 /// ```
 /// use stretch_gap::DetectionLimit;
 /// use stretch_report::limit_table;
-/// let strength = Some(0.0123);
-/// let limit = DetectionLimit { effect: "creep".into(), parameter: "c".into(), strength, unit: "1".into(), others: Default::default() };
-/// assert_eq!(limit_table(&[limit]).rows[0], ["creep", "c", "0.0123"]);
+/// let limit = r#"{ "effect": "creep", "parameter": "c", "strength": null, "unit": "1", "seen": 0.0123, "like": "relaxation" }"#;
+/// let limit: DetectionLimit = serde_json::from_str(limit)?;
+/// let row = ["creep", "c", "0.0123", "cannot be told apart from relaxation"];
+/// assert_eq!(limit_table(&[limit]).rows[0], row);
+/// # Ok::<(), serde_json::Error>(())
 /// ```
 pub fn limit_table(limits: &[DetectionLimit]) -> Table {
     let row = |limit: &DetectionLimit| {
-        let strength =
-            limit.strength.map(|strength| with_unit(&number(strength, 3), shown_unit(&limit.unit)));
+        let shown = |strength: f64| with_unit(&number(strength, 3), shown_unit(&limit.unit));
         let none = || "none within its range".to_owned();
-        vec![limit.effect.clone(), limit.parameter.clone(), strength.unwrap_or_else(none)]
+        let like = || limit.like.as_ref().map(|like| format!("cannot be told apart from {like}"));
+        let named = limit.strength.map(shown).or_else(like).unwrap_or_else(none);
+        let seen = limit.seen.or(limit.strength).map_or_else(none, shown);
+        vec![limit.effect.clone(), limit.parameter.clone(), seen, named]
     };
     Table::new(
-        "Detection limits: the strength at which each effect would be named on these data with probability 0.9, \
-         if nothing else is missing",
-        &["Effect", "Parameter", "Limit"],
+        "Detection limits: the strength at which something would be seen on these data, and at which the effect would be \
+         named, each with probability 0.9 if nothing else is missing",
+        &["Effect", "Parameter", "Seen from", "Named from"],
         limits.iter().map(row),
     )
 }

@@ -176,8 +176,9 @@ class Diagnosis:
         """Strength from which each effect would be named on these data, dict of dicts by effect.
 
         Each dict holds `parameter` (the parameter that is the strength of the effect), `strength` (its value, or None if no
-        value in the range would suffice), `unit`, and `others` (values of the other parameters). The dict is empty if an effect
-        is named, or if the recording is not sufficient to name one.
+        value in the range would suffice), `unit`, and `others` (values of the other parameters). `seen` is the strength from
+        which something would be seen, and `like` the most similar effect, if it makes `strength` larger than `seen`. The dict is
+        empty if an effect is named, or if the recording is not sufficient to name one.
         """
         limits = self._answer.get("detection_limits", [])
         return {limit["effect"]: {k: v for k, v in limit.items() if k != "effect"} for limit in limits}

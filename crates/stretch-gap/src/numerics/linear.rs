@@ -36,12 +36,6 @@ impl Cholesky {
         self.0.l_dirty().solve_lower_triangular_mut(&mut b);
     }
 
-    /// Returns L x.
-    pub(crate) fn times(&self, x: &[f64]) -> Vec<f64> {
-        let l = self.0.l_dirty();
-        (0..x.len()).map(|i| (0..=i).map(|j| l[(i, j)] * x[j]).sum()).collect()
-    }
-
     /// Solves L' x = y in place.
     pub(crate) fn backward(&self, y: &mut [f64]) {
         let mut y = DVectorViewMut::from_slice(y, y.len());

@@ -84,7 +84,8 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         let outputs = outputs.collect::<Result<_, _>>()?;
         let shipped = Ground::around(compare, problem.shipped.clone())?;
         let mut bench = Self { problem, suspect, ground, shipped, outputs, left: Vec::new() };
-        bench.left = stages.map(|s| bench.squares(s, ground, &ground.residuals[s])).collect();
+        bench.left =
+            stages.map(|s| bench.squares(s, ground, ground.residuals[s].clone())).collect();
         Ok(bench)
     }
 
@@ -132,11 +133,12 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
     /// what remains.
     fn beside_shipped(&self, fault: usize, size: f64) -> Result<Promising, GapError> {
         let mut model = self.with(&self.problem.shipped, fault, size);
+        let compare = &self.problem.compare;
         let touches = &self.suspect.faults()[fault].touches;
         for &stage in touches {
-            let residual = self.residual(stage, &model)?;
+            let residual = compare.residual(stage, &model)?;
             let known = self.shipped.known[stage].as_deref().unwrap_or(&[]);
-            let mut step = self.told(stage, &self.shipped, &residual);
+            let mut step = compare.projected(&self.shipped, stage, residual).of_known;
             self.shipped.solved[stage].0.backward(&mut step);
             for ((p, _), step) in known.iter().zip(step) {
                 let spec = &self.problem.simulator().parameters()[*p];
@@ -146,8 +148,8 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         }
         let mut fall = 0.0;
         for &stage in touches {
-            let residual = self.residual(stage, &model)?;
-            fall += self.left[stage] - self.squares(stage, &self.shipped, &residual);
+            let residual = compare.residual(stage, &model)?;
+            fall += self.left[stage] - self.squares(stage, &self.shipped, residual);
         }
         Ok(self.promising(fault, model, fall))
     }
@@ -166,19 +168,10 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
             _ => size,
         };
         let model = self.with(base, fault, size);
-        let (mut own, mut mixed) = (0.0, 0.0);
-        for &stage in &one.touches {
-            let there = self.problem.compare.residual_values(stage, &model)?;
-            let here = &self.ground.residuals[stage].values;
-            let change = here.iter().zip(&there).map(|(a, b)| a - b).collect();
-            let change =
-                self.problem.compare.metrics[stage].column(&self.problem.compare.roles, change);
-            let told = self.told(stage, self.ground, &change);
-            let product = |x: &Weighted| self.problem.compare.product(stage, &change, x);
-            let of_residual = self.told(stage, self.ground, &self.ground.residuals[stage]);
-            own += product(&change) - dot(&told, &told);
-            mixed += product(&self.ground.residuals[stage]) - dot(&told, &of_residual);
-        }
+        let compare = &self.problem.compare;
+        let there = one.touches.iter().map(|&stage| compare.residual_values(stage, &model));
+        let there = there.collect::<Result<_, GapError>>()?;
+        let (own, mixed) = compare.change(self.ground, &one.touches, there).unwrap_or_default();
         let most = if one.kind == Kind::Sign { 1.0 } else { f64::INFINITY };
         let least = if one.kind == Kind::Sign { 1.0 } else { 0.0 };
         let share = (mixed / own.max(f64::MIN_POSITIVE)).clamp(least, most);
@@ -186,25 +179,12 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         Ok(self.promising(fault, start, share * (2.0 * mixed - share * own)))
     }
 
-    fn residual(&self, stage: usize, model: &Model) -> Result<Weighted, GapError> {
-        self.problem.compare.residual(stage, model)
-    }
-
-    /// Returns L^-1 A'V^-1 x, the projection of a column x on the sensitivities A around a model; L
-    /// is the factor of their normal matrix.
-    fn told(&self, stage: usize, ground: &Ground, x: &Weighted) -> Vec<f64> {
-        let known = ground.known[stage].as_deref().unwrap_or(&[]);
-        let mut told: Vec<f64> =
-            known.iter().map(|(_, k)| self.problem.compare.product(stage, k, x)).collect();
-        ground.solved[stage].0.forward(&mut told);
-        told
-    }
-
     /// Returns the sum of squares of a residual over the fitted samples, after re-tuning is
     /// projected out.
-    fn squares(&self, stage: usize, ground: &Ground, residual: &Weighted) -> f64 {
-        let told = self.told(stage, ground, residual);
-        self.problem.compare.product(stage, residual, residual) - dot(&told, &told)
+    fn squares(&self, stage: usize, ground: &Ground, residual: Weighted) -> f64 {
+        let compare = &self.problem.compare;
+        let residual = compare.projected(ground, stage, residual);
+        compare.inner(stage, &residual, &residual)
     }
 
     /// Returns the sizes of an error that are simulated.

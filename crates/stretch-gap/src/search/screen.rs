@@ -24,7 +24,7 @@ use crate::{
         comparison::{Comparison, Sensitivities},
         metric::Column,
     },
-    numerics::linear::Cholesky,
+    numerics::linear::{Cholesky, dot},
     problem::{error::GapError, simulator::Model, spec::EffectSpec},
 };
 
@@ -90,6 +90,13 @@ impl Ground {
         }
         Ok(Self { model, residuals, known: knowns, solved: solveds })
     }
+}
+
+/// A column d of one stage, with what the projection needs.
+pub(crate) struct Projected {
+    pub(crate) column: Column,
+    /// L^-1 A'V^-1 d, with the factor L of A'V^-1 A + b I.
+    pub(crate) of_known: Vec<f64>,
 }
 
 impl Comparison<'_> {
@@ -158,7 +165,7 @@ impl Comparison<'_> {
 
     /// Returns <d,d> and <d,r> of a change d; `there` holds the residuals with the effect, for the
     /// stages that it touches.
-    fn change(
+    pub(crate) fn change(
         &self,
         ground: &Ground,
         touches: &[usize],
@@ -166,14 +173,39 @@ impl Comparison<'_> {
     ) -> Option<(f64, f64)> {
         let (mut own, mut mixed) = (0.0, 0.0);
         for (&stage, there) in touches.iter().zip(&there) {
-            let here = &ground.residuals[stage].values;
-            let change = here.iter().zip(there).map(|(a, b)| a - b).collect();
-            let change = self.metrics[stage].column(&self.roles, change);
-            let (squares, product) = self.projected(stage, ground, &change);
-            own += squares;
-            mixed += product;
+            let change = self.projected_change(ground, stage, there);
+            own += self.inner(stage, &change, &change).max(0.0);
+            let residual = &ground.residuals[stage];
+            mixed += self.product(stage, &change.column, residual)
+                - dot(&change.of_known, &ground.solved[stage].1);
         }
         (own > NO_CHANGE).then_some((own, mixed))
+    }
+
+    /// Returns the change of one stage's output from the model of `ground` to a model with the
+    /// residual `there`.
+    pub(crate) fn projected_change(
+        &self,
+        ground: &Ground,
+        stage: usize,
+        there: &[f64],
+    ) -> Projected {
+        let here = &ground.residuals[stage].values;
+        let change = here.iter().zip(there).map(|(a, b)| a - b).collect();
+        self.projected(ground, stage, self.metrics[stage].column(&self.roles, change))
+    }
+
+    /// Prepares a column of one stage for [`Comparison::inner`].
+    pub(crate) fn projected(&self, ground: &Ground, stage: usize, column: Column) -> Projected {
+        let known = ground.known[stage].iter().flatten();
+        let mut of_known: Vec<f64> = known.map(|(_, k)| self.product(stage, k, &column)).collect();
+        ground.solved[stage].0.forward(&mut of_known);
+        Projected { column, of_known }
+    }
+
+    /// Returns <x,y> of two changes of one stage.
+    pub(crate) fn inner(&self, stage: usize, x: &Projected, y: &Projected) -> f64 {
+        self.product(stage, &x.column, &y.column) - dot(&x.of_known, &y.of_known)
     }
 
     /// Returns the factor L of A'V^-1 A + b I, and L^-1 A'V^-1 r.
@@ -200,22 +232,6 @@ impl Comparison<'_> {
         let mut of_residual: Vec<f64> = known.iter().map(|(_, k)| product(k, residual)).collect();
         factor.forward(&mut of_residual);
         (factor, of_residual)
-    }
-
-    /// Returns <d,d> and <d,r> of a change in one stage.
-    fn projected(&self, stage: usize, ground: &Ground, change: &Column) -> (f64, f64) {
-        let residual = &ground.residuals[stage];
-        let product = |a: &Column, b: &Column| self.product(stage, a, b);
-        let mut own = product(change, change);
-        let mut mixed = product(change, residual);
-        let (factor, of_residual) = &ground.solved[stage];
-        if let Some(known) = ground.known[stage].as_ref().filter(|k| !k.is_empty()) {
-            let mut of_change: Vec<f64> = known.iter().map(|(_, k)| product(k, change)).collect();
-            factor.forward(&mut of_change);
-            own -= of_change.iter().map(|x| x * x).sum::<f64>();
-            mixed -= of_change.iter().zip(of_residual).map(|(x, y)| x * y).sum::<f64>();
-        }
-        (own.max(0.0), mixed)
     }
 }
 

@@ -63,7 +63,7 @@ pub(crate) struct Search<'a> {
 
 /// A model, and the screens of all effects that it does not contain; the best come first.
 pub(crate) struct Looked {
-    ground: Ground,
+    pub(crate) ground: Ground,
     pub(crate) screened: Vec<Screened>,
 }
 

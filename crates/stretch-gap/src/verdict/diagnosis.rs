@@ -253,7 +253,8 @@ impl Diagnosis {
         let names = names.chain(self.candidates.iter_mut().flat_map(|c| &mut c.effects));
         let names = names.chain(self.shares.iter_mut().map(|s| &mut s.effect));
         let names = names.chain(self.stabilities.iter_mut().map(|s| &mut s.effect));
-        let names = names.chain(self.detection_limits.iter_mut().map(|l| &mut l.effect));
+        let limits = self.detection_limits.iter_mut();
+        let names = names.chain(limits.flat_map(|l| l.like.iter_mut().chain([&mut l.effect])));
         let simpler = self.baselines.iter_mut();
         let simpler = simpler.flat_map(|b| [&mut b.largest_drop, &mut b.signature, &mut b.bic]);
         let names = names.chain(simpler.flatten());

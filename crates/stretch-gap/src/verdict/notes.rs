@@ -342,7 +342,7 @@ pub(crate) fn detection_limit_note(
         .text("An effect would have been named if it were stronger than its limit: ");
     let listed = known.iter().take(LISTED).enumerate().fold(begin, one);
     let rest = if known.len() > LISTED { ", and more in the table" } else { "" };
-    let how = format!("{rest} (with probability 0.9, by linearised draws).");
+    let how = format!("{rest} (with probability 0.9).");
     (!known.is_empty()).then(|| listed.text(how))
 }
 
@@ -363,6 +363,8 @@ mod tests {
             strength,
             unit: "V".into(),
             others: Default::default(),
+            seen: None,
+            like: None,
         };
         let effects: Vec<EffectSpec> = (0..9).map(spec).collect();
         let limits: Vec<DetectionLimit> =

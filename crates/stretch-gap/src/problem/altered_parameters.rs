@@ -5,12 +5,10 @@
 //! part of the gap that is attributed to effects.
 
 use crate::problem::{
-    column::Distortion,
     description::Description,
     error::GapError,
-    simulator::{Model, ModelRuns, Run, Simulator},
+    simulator::{Run, Simulator},
     spec::ParameterSpec,
-    spectral_line::Line,
 };
 
 /// A simulator with other specifications of its parameters.
@@ -35,47 +33,15 @@ impl Simulator for Altered<'_> {
         &self.about
     }
 
+    fn wrapped(&self) -> Option<&dyn Simulator> {
+        Some(self.simulator)
+    }
+
     fn measured(&self, stage: usize) -> &[f64] {
         self.simulator.measured(stage)
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
         self.simulator.simulate(run, out)
-    }
-
-    fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
-        self.simulator.simulate_many(runs, outs)
-    }
-
-    fn model_runs(&self) -> Option<ModelRuns> {
-        self.simulator.model_runs()
-    }
-
-    fn is_costly(&self, effect: usize) -> bool {
-        self.simulator.is_costly(effect)
-    }
-
-    fn linearise(&self, run: Run<'_>) -> Result<(), GapError> {
-        self.simulator.linearise(run)
-    }
-
-    fn input(&self, stage: usize) -> Option<Vec<f64>> {
-        self.simulator.input(stage)
-    }
-
-    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
-        self.simulator.simulate_on(run, input, out)
-    }
-
-    fn corrected(
-        &self,
-        column: &str,
-        error: Distortion,
-    ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
-        self.simulator.corrected(column, error)
-    }
-
-    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
-        self.simulator.lines(stage, model)
     }
 }

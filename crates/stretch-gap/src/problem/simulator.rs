@@ -122,6 +122,12 @@ pub trait Simulator: Sync {
     /// Returns the measured output of a stage, all trials concatenated.
     fn measured(&self, stage: usize) -> &[f64];
 
+    /// Returns the simulator around which this one is a wrapper, if it is one. The optional methods
+    /// are then those of that simulator, unless the wrapper overrides them.
+    fn wrapped(&self) -> Option<&dyn Simulator> {
+        None
+    }
+
     /// Simulates a stage on its measured input. Effects of other stages in the model are ignored.
     ///
     /// `out` receives the samples of the first `run.trials` trials.
@@ -136,20 +142,22 @@ pub trait Simulator: Sync {
     ///
     /// `outs` has one vector for each run, which receives its samples.
     fn simulate_many(&self, runs: &[Run<'_>], outs: &mut [Vec<f64>]) -> Vec<Result<(), GapError>> {
-        on_all_threads(self, runs, outs)
+        match self.wrapped() {
+            Some(wrapped) => wrapped.simulate_many(runs, outs),
+            None => on_all_threads(self, runs, outs),
+        }
     }
 
     /// Returns the number of runs so far, if each run is costly enough to be counted and stored. If
     /// stored runs are reused, this number is smaller than the number of simulated stages.
     fn model_runs(&self) -> Option<ModelRuns> {
-        None
+        self.wrapped()?.model_runs()
     }
 
     /// Whether each value of an effect needs a separate costly run. During a fit, sensitivities to
     /// this effect are then recomputed as rarely as those to the nominal parameters.
     fn is_costly(&self, effect: usize) -> bool {
-        let _ = effect;
-        false
+        self.wrapped().is_some_and(|wrapped| wrapped.is_costly(effect))
     }
 
     /// Computes the sensitivities of a stage to its nominal parameters around a run. Later runs
@@ -160,15 +168,13 @@ pub trait Simulator: Sync {
     /// # Errors
     /// The simulation is not possible with these values.
     fn linearise(&self, run: Run<'_>) -> Result<(), GapError> {
-        let _ = run;
-        Ok(())
+        self.wrapped().map_or(Ok(()), |wrapped| wrapped.linearise(run))
     }
 
     /// Returns the measured input of a stage as it is fed to the stage, all trials concatenated.
     /// `None` if the input is not the output of the previous stage.
     fn input(&self, stage: usize) -> Option<Vec<f64>> {
-        let _ = stage;
-        None
+        self.wrapped()?.input(stage)
     }
 
     /// Simulates a stage on an input that was not measured. Returns false if the stage does not
@@ -177,8 +183,7 @@ pub trait Simulator: Sync {
     /// # Errors
     /// The simulation is not possible with these values.
     fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
-        let _ = (run, input, out);
-        Ok(false)
+        self.wrapped().map_or(Ok(false), |wrapped| wrapped.simulate_on(run, input, out))
     }
 
     /// Returns the same simulator, with the stages that one column drives run on that column after
@@ -192,15 +197,13 @@ pub trait Simulator: Sync {
         column: &str,
         error: Distortion,
     ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
-        let _ = (column, error);
-        Ok(None)
+        self.wrapped().map_or(Ok(None), |wrapped| wrapped.corrected(column, error))
     }
 
     /// Returns spectral lines of known amplitude and unknown phase that the effects of a model add
     /// to a stage's output on samples that are not fitted; see [`Line`].
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
-        let _ = (stage, model);
-        Vec::new()
+        self.wrapped().map_or_else(Vec::new, |wrapped| wrapped.lines(stage, model))
     }
 }
 

@@ -9,10 +9,10 @@ use std::{collections::VecDeque, sync::Mutex};
 
 use crate::{
     problem::{
-        column::{Column, Distortion},
+        column::Column,
         description::Description,
         error::GapError,
-        simulator::{Model, ModelRuns, Run, Simulator, on_all_threads},
+        simulator::{Model, Run, Simulator, on_all_threads},
         spectral_line::Line,
     },
     record::fault::{Fault, Kind},
@@ -121,6 +121,10 @@ impl Simulator for Suspect<'_> {
         &self.about
     }
 
+    fn wrapped(&self) -> Option<&dyn Simulator> {
+        Some(self.simulator)
+    }
+
     fn measured(&self, stage: usize) -> &[f64] {
         self.simulator.measured(stage)
     }
@@ -156,35 +160,15 @@ impl Simulator for Suspect<'_> {
         }
     }
 
-    fn model_runs(&self) -> Option<ModelRuns> {
-        self.simulator.model_runs()
-    }
-
     fn is_costly(&self, effect: usize) -> bool {
         // Each value of an error needs a run of the simulator.
         let is_error = effect >= self.first;
         is_error && self.model_runs().is_some() || self.simulator.is_costly(effect)
     }
 
-    fn linearise(&self, run: Run<'_>) -> Result<(), GapError> {
-        self.simulator.linearise(run)
-    }
-
-    fn input(&self, stage: usize) -> Option<Vec<f64>> {
-        self.simulator.input(stage)
-    }
-
     fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
         let model = self.without_errors(run.model);
         self.simulator.simulate_on(Run { model: &model, ..run }, input, out)
-    }
-
-    fn corrected(
-        &self,
-        column: &str,
-        error: Distortion,
-    ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
-        self.simulator.corrected(column, error)
     }
 
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {

@@ -1,6 +1,6 @@
-//! First-order lags: one pole, or two in series.
+//! Low-pass filters with one or two poles.
 
-use alloc::{boxed::Box, vec, vec::Vec};
+use alloc::{boxed::Box, format, vec, vec::Vec};
 
 use stretch_core::arithmetic::lag_weights;
 
@@ -9,6 +9,7 @@ use crate::{
     grid::Grid,
     kind::{Family, Kind, Side},
     operator::{Operator, Span, Start},
+    oscillator::{Oscillator, Swing},
     parameter::{EffectParameter, Form},
     place::Place,
     sketch::Sketch,
@@ -91,62 +92,90 @@ impl MeanReversion {
 pub struct Poles {
     /// Sum of the time constants, s: the lag behind a ramp.
     pub tau_s: f64,
-    /// Share of `tau_s` that the second pole has; 0 gives one pole.
+    /// Share of `tau_s` that the second pole has, up to 0.5; 0 gives one pole. Above 0.5 the poles are complex.
     pub second: f64,
 }
 
-/// A low-pass with one or two real poles: y = mean_rev(mean_rev(x, tau (1 - second)), tau second). Here mean_rev(x,
-/// tau) is x behind the first-order lag [`MeanReversion`].
+/// A low-pass with one or two poles and the transfer function 1/(1 + tau s + b tau^2 s^2).
+///
+/// Up to `second` = 0.5 the poles are real, b = second (1 - second), and the low-pass is two lags in series,
+/// y = mean_rev(mean_rev(x, tau (1 - second)), tau second). Here mean_rev(x, tau) is x behind the first-order lag
+/// [`MeanReversion`]. Above 0.5 the poles are complex and b = second^2: an [`Oscillator`] with m = tau second and the
+/// damping ratio 1/(2 second). A Butterworth filter of second order has `second` = 0.7071, a Bessel filter 0.5774.
 ///
 /// Every trial begins with a settled state, independent of its `Start`.
 ///
 /// ```
 /// use stretch_effects::{Grid, Lowpass, Operator, Poles, Span, Start};
 /// let grid = Grid::samples(0.01)?;
-/// for second in [0.0, 0.3] {
+/// for second in [0.0, 0.3, 0.5, 0.7071] {
 ///     let slow = Lowpass::new(Poles { tau_s: 0.1, second }, &grid);
 ///     let mut cells = vec![0.0; slow.cells()];
 ///     let mut ramp: Vec<f64> = (0..300).map(|i| 0.01 * i as f64).collect();
 ///     slow.begin(Start::Settled, 0.0, &mut cells);
 ///     slow.run(&Span::whole(&grid), &mut cells, &mut ramp);
 ///     // A ramp is trailed by tau, whatever the poles; the second takes the first's output as linear between samples.
-///     assert!((ramp[299] - (2.99 - 0.1)).abs() < 1e-9);
+///     assert!((ramp[299] - (2.99 - 0.1)).abs() < 1e-8);
 /// }
 /// # Ok::<(), stretch_effects::GridError>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct Lowpass {
-    poles: Vec<MeanReversion>,
+pub struct Lowpass(Filter);
+
+#[derive(Debug, Clone, PartialEq)]
+enum Filter {
+    Real(Vec<MeanReversion>),
+    Complex(Oscillator),
 }
+
+/// Largest `second` at which the poles are real.
+const REAL: f64 = 0.5;
 
 impl Lowpass {
     /// A low-pass with one or two poles on a grid.
     pub fn new(poles: Poles, grid: &Grid) -> Self {
         let Poles { tau_s, second } = poles;
+        if second > REAL {
+            let swing = Swing { m: tau_s * second, damping: 0.5 / second, drag: 0.0, dry: 0.0 };
+            return Self(Filter::Complex(Oscillator::new(swing, grid)));
+        }
         // The reach scales only `Start::Hysteresis`, which a low-pass does not use.
         let pole = |tau: f64| MeanReversion::new(tau, 0.0, grid);
         let mut poles = Vec::from([pole(tau_s * (1.0 - second))]);
         if second != 0.0 {
             poles.push(pole(tau_s * second));
         }
-        Self { poles }
+        Self(Filter::Real(poles))
     }
 }
 
 impl Operator for Lowpass {
     fn cells(&self) -> usize {
-        self.poles.len() * MeanReversion::CELLS
+        match &self.0 {
+            Filter::Real(poles) => poles.len() * MeanReversion::CELLS,
+            Filter::Complex(pair) => pair.cells(),
+        }
     }
 
     fn begin(&self, _start: Start, first: f64, cells: &mut [f64]) {
-        for (pole, own) in self.poles.iter().zip(cells.chunks_mut(MeanReversion::CELLS)) {
-            pole.begin(Start::Settled, first, own);
+        match &self.0 {
+            Filter::Real(poles) => {
+                for (pole, own) in poles.iter().zip(cells.chunks_mut(MeanReversion::CELLS)) {
+                    pole.begin(Start::Settled, first, own);
+                }
+            }
+            Filter::Complex(pair) => pair.begin(Start::Settled, first, cells),
         }
     }
 
     fn run(&self, span: &Span<'_>, cells: &mut [f64], signal: &mut [f64]) {
-        for (pole, own) in self.poles.iter().zip(cells.chunks_mut(MeanReversion::CELLS)) {
-            pole.run(span, own, signal, |_, z| z);
+        match &self.0 {
+            Filter::Real(poles) => {
+                for (pole, own) in poles.iter().zip(cells.chunks_mut(MeanReversion::CELLS)) {
+                    pole.run(span, own, signal, |_, z| z);
+                }
+            }
+            Filter::Complex(pair) => pair.run(span, cells, signal),
         }
     }
 }
@@ -179,6 +208,24 @@ pub static LAG: Kind = Kind {
                     let y = s.z";
                 Sketch::of(x, body).with("TAU", v[0], "s").remembering(["z", "last"])
             }
+            second if second > REAL => {
+                let body = "let sn = exp(-DT / (2 * SECOND * M)) * sin(W * DT) / W
+                    let cs = exp(-DT / (2 * SECOND * M)) * cos(W * DT)
+                    let slope = (x - s.last) / DT
+                    let p = s.at - s.last + M / SECOND * slope
+                    let q = s.speed - slope
+                    s.at = x - M / SECOND * slope + (cs + sn / (2 * SECOND * M)) * p + sn * q
+                    s.speed = slope - sn / (M * M) * p + (cs - sn / (2 * SECOND * M)) * q
+                    s.last = x
+                    let y = s.at";
+                let m = v[0] * second;
+                let omega = libm::sqrt(1.0 - 0.25 / (second * second)) / m;
+                let speed = format!("{}/s", signals.x.unit);
+                Sketch::of(x, body)
+                    .remembering(["at", "last"])
+                    .cells(["speed"], speed, "0")
+                    .with_all(&[("M", m, "s"), ("SECOND", second, "1"), ("W", omega, "1/s")])
+            }
             second => {
                 let body = "let k = exp(-DT / (TAU * (1 - SECOND)))
                     let m = (1 - k) * TAU * (1 - SECOND) / DT
@@ -206,10 +253,10 @@ pub(crate) static AMPLIFIER_LOWPASS: Effect = Effect {
     name: "amplifier_lowpass",
     title: "the amplifier's lag",
     words: "the amplifier is slow",
-    equation: "v -> mean_rev(mean_rev(v, tau (1 - second)), tau second)",
+    equation: "v -> mean_rev(mean_rev(v, tau (1 - second)), tau second); complex poles if second is above 0.5",
     parameters: &[
         EffectParameter::strength("tau", "s", 0.0, 0.4, 0.05),
-        EffectParameter::form("second", "1", 0.0, 0.5, Form { neutral: 0.0, usual: 0.1 }),
+        EffectParameter::form("second", "1", 0.0, 1.0, Form { neutral: 0.0, usual: 0.1 }),
     ],
     acts: Acts::at(&LAG, Place::Volts),
     twins: &["channel_skew", "gauge_relaxation"],

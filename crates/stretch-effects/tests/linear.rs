@@ -79,7 +79,8 @@ fn times() -> impl Strategy<Value = Times> {
 /// Operators that are exact for lines between nodes.
 fn exact() -> impl Strategy<Value = Linear> {
     prop_oneof![
-        (0.005..0.1_f64).prop_map(|tau_s| Linear::Lag(Poles { tau_s, second: 0.0 })),
+        (0.005..0.1_f64, prop_oneof![Just(0.0), 0.501..1.0_f64])
+            .prop_map(|(tau_s, second)| Linear::Lag(Poles { tau_s, second })),
         masses().prop_map(|(m, damping)| Linear::Mass { m, damping }),
         masses().prop_map(|(m, damping)| Linear::Joint { m, damping }),
         (-0.5..0.6_f64, times()).prop_map(|(share, times)| Linear::Fading { share, times }),
@@ -242,4 +243,16 @@ proptest! {
         prop_assert!(read(skew_s, empty).iter().all(|y| *y == (1.0 - empty) * signal[0]));
         prop_assert!(read(-skew_s, empty).iter().all(|y| *y == last));
     }
+}
+
+/// Real and complex poles meet at equal poles.
+#[test]
+fn poles_change_continuously() {
+    let step = [vec![0.0; 3], vec![1.0; 60]].concat();
+    let of = |second| Linear::Lag(Poles { tau_s: 0.05, second }).respond(&step);
+    // Two real poles pass on the output of the first as linear between samples.
+    assert!(apart(&of(0.5), &of(0.500_001)) < 0.02);
+    // A Butterworth filter overshoots by exp(-pi) = 4.3 %.
+    let top = of(0.5_f64.sqrt()).into_iter().fold(0.0, f64::max);
+    assert!((top - 1.0 - (-std::f64::consts::PI).exp()).abs() < 2e-3, "{top}");
 }

@@ -38,8 +38,9 @@ impl Extent {
         Self { low, high, quickest, dt_s, trial_s, session_s, lattice, beside, load }
     }
 
-    /// Computes the extent of a channel from the parts that may be used. The session is set to the length of the
-    /// longest part; the ranges of the second signal and of the load are set to zero.
+    /// Computes the extent of a channel from the parts that may be used. The duration of the session (`session_s`) is
+    /// set to that of the longest part. The ranges `beside` and `load` are set to zero, because they belong to other
+    /// signals.
     ///
     /// ```
     /// use stretch_effects::Extent;

@@ -218,10 +218,14 @@ fn repeats_itself(values: &[f64], dt_s: f64) -> bool {
 /// Returns the stretches in which a column repeats one value while another column moves. The value is not an end of the
 /// range, and it is repeated so often that noise alone would repeat it in one of a billion recordings.
 ///
-/// A sensor behind a play or a dead band also repeats values. A stretch therefore counts only if
-/// the column has white noise, if it jumps at the end of the stretch (the output of a play
-/// continues from its last value), or if another column covers more of its range than any play
-/// could hide.
+/// A sensor behind a play or a dead band also repeats values. A stretch therefore counts only in
+/// three cases:
+///
+/// - the column has white noise;
+/// - the column jumps at the end of the stretch, whereas the output of a play would continue from
+///   its last value;
+/// - during the stretch another column covers at least [`RANGE`] of its own range, which no play
+///   could hide.
 fn stuck(values: &[f64], others: &[&[f64]], trials: &[(usize, usize)]) -> Vec<(usize, usize)> {
     let (low, high) = ends(values);
     let mut runs: Vec<(usize, usize)> = Vec::new();

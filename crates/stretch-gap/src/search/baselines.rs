@@ -35,8 +35,9 @@ use crate::{
 pub struct Baselines {
     /// Effect with the largest reduction of the error, with nominal parameters as shipped.
     pub largest_drop: Option<String>,
-    /// Effect whose simulated change correlates best with the residual, after nominal sensitivities
-    /// are projected out.
+    /// Effect whose simulated change correlates best with the residual of the re-tuned simulator,
+    /// after the part that a change of the nominal parameters could explain is projected out of
+    /// both.
     pub signature: Option<String>,
     /// Single effect with the best Bayesian information criterion. Each effect is fitted jointly with the parameters.
     /// The criterion treats the samples as independent.

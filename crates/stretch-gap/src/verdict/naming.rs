@@ -84,8 +84,8 @@ impl Naming {
     }
 }
 
-/// Returns the effect of the first set that the second set lacks, and the one in its place, if the
-/// sets differ in nothing else.
+/// If the sets differ in exactly one effect, returns that effect of the first set and the effect
+/// that the second set has in its place; otherwise `None`.
 fn replaced<'a>(first: &'a [String], second: &'a [String]) -> Option<(&'a String, &'a String)> {
     let lost: Vec<&String> = first.iter().filter(|e| !second.contains(e)).collect();
     let new: Vec<&String> = second.iter().filter(|e| !first.contains(e)).collect();

@@ -50,7 +50,8 @@ pub(super) fn anywhere(which: usize) -> ParameterSpec {
     ParameterSpec { nominal: MEAN.0, sd: MEAN.1, per_tick_sd, ..at_rows(which) }
 }
 
-/// For every sample, the number of switches of the trial so far.
+/// Returns, for each sample of a trial, how many times the commands of inlet and outlet have changed
+/// up to that sample.
 pub(super) fn switches(inlet: &[f64], outlet: &[f64]) -> impl Iterator<Item = u32> {
     let mut count = 0;
     (0..inlet.len()).map(move |i| {

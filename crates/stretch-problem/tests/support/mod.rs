@@ -1,5 +1,5 @@
-//! Helpers that the tests share: seeded noise, effects by name, a rig that is not as shipped, lost
-//! rows, small sessions.
+//! Helpers that the tests share: seeded noise, sets of effects given by name, a rig whose parameters
+//! are not nominal but within their tolerances, removal of rows, and small simulated sessions.
 
 pub(crate) mod effects;
 pub(crate) mod rigs;

@@ -75,12 +75,15 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
     /// Converts a calibration for the codes of `adc`.
     ///
     /// # Errors
-    /// [`ReceptorError`], naming the field: a rate estimator other than the
-    /// Savitzky-Golay of this type (`rate.*`), a surface with terms beyond
-    /// poly13 (`model.surface.terms`), a number that the arithmetic cannot hold
-    /// (`fixed.*`, `surface`), or, in fixed point, a [worst-case
-    /// error](FixedCalibration::worst_case_error_um) above 0.01 % of the
-    /// target's span (`fixed.error`).
+    /// [`ReceptorError`], which names the field, if
+    ///
+    /// - the rate estimator is no Savitzky-Golay filter (`rate estimator`), or has another window,
+    ///   degree or delay than this type (`rate.*`);
+    /// - the model is neither a line nor surfaces (`model`), or a surface has terms beyond those of
+    ///   poly13 (`model.surface.terms`);
+    /// - a number does not fit into the arithmetic (`fixed.*`, `surface`);
+    /// - in fixed point, the [worst-case error](FixedCalibration::worst_case_error_um) exceeds
+    ///   0.01 % of the target's span (`fixed.error`).
     pub fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, ReceptorError> {
         Self::check_estimator(calibration.spec().rate_estimator)?;
         let units = Units::new(

@@ -121,7 +121,9 @@ fn fixed_with(
     )
 }
 
-/// The largest error of surfaces in thousandths: see
+/// Returns a bound on the difference between an estimate in fixed point and the same estimate in
+/// real numbers, in thousandths of the reference's unit. If there are two surfaces, it is the larger
+/// of their bounds. See
 /// [`FixedCalibration::worst_case_error_um`](super::FixedCalibration::worst_case_error_um).
 pub(super) fn worst_case(
     surfaces: &CodeMap<Scaled<FixedLine>, Scaled<FixedPoly13>>,

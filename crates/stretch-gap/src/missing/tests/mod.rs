@@ -1,5 +1,5 @@
-//! Tests of terms, of the library of terms, and of the odds of sums of terms against coloured
-//! noise, on synthetic signals.
+//! Tests on synthetic signals: each term, the library of terms, the odds that a sum of terms
+//! explains a residual rather than coloured noise, and the texts of proposals.
 
 mod shelf;
 mod terms;

@@ -47,7 +47,9 @@ impl Places {
     }
 }
 
-/// Divides the rows into parts.
+/// Divides the rows into parts for cross-validation: one part per trial if there are three or more,
+/// otherwise six parts of equal length. Computes the factor of all rows, and for each part the factor
+/// of the rows outside it.
 pub(crate) fn parted(
     channels: &Channels,
     bank: &Bank,

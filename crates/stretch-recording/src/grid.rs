@@ -91,7 +91,9 @@ pub(crate) fn merged(
 }
 
 fn no_channels(file: &str, notes: &[String]) -> RecordingError {
-    RecordingError::NoChannels { file: file.to_owned(), notes: notes.join("; ") }
+    let notes = if notes.is_empty() { String::new() } else { format!(" ({})", notes.join("; ")) };
+    let problem = format!("it holds no column of numbers besides the time{notes}");
+    RecordingError::unusable(file, problem)
 }
 
 /// Joins tracks into one recording: on the only clock, on the fastest of several clocks, or on an even grid.
@@ -351,13 +353,14 @@ fn on_one_grid(
     let (from_s, to_s) = (span(last).0, span(soonest).1);
     if from_s > to_s {
         let told = |t: &Timed| format!("{:.3} .. {:.3}", span(t).0, span(t).1);
-        return Err(RecordingError::NoOverlap {
-            file: file.to_owned(),
-            first: soonest.clock.clone(),
-            first_s: told(soonest),
-            second: last.clock.clone(),
-            second_s: told(last),
-        });
+        let problem = format!(
+            "{} and {} have no time in common ({} s and {} s); they cannot be brought to one grid: leave one of them out",
+            soonest.clock,
+            last.clock,
+            told(soonest),
+            told(last)
+        );
+        return Err(RecordingError::unusable(file, problem));
     }
     let own = fastest(timed);
     let mut time_s: Vec<f64> = match grid_hz {
@@ -367,10 +370,13 @@ fn on_one_grid(
             let own = timed.iter().map(|t| t.time_s.len() * (1 + t.channels.len())).sum::<usize>();
             let count = ((to_s - from_s) * rate_hz).max(0.0) * columns as f64;
             let mut room = Room::beside((own * size_of::<f64>()) as u64);
-            room.take_numbers(count as usize).map_err(|_| RecordingError::Grid {
-                file: file.to_owned(),
-                rate_hz,
-                span_s: to_s - from_s,
+            room.take_numbers(count as usize).map_err(|_| {
+                let span_s = to_s - from_s;
+                let problem = format!(
+                    "a grid of {rate_hz} Hz has {:.1e} instants in its {span_s} s, many times what was recorded; give a lower rate with --grid, or split the recording at the gap in its time",
+                    rate_hz * span_s
+                );
+                RecordingError::unusable(file, problem)
             })?;
             even(from_s, to_s, rate_hz, file)?
         }

@@ -19,7 +19,7 @@ mod text;
 mod time_column;
 
 pub use arrays::{Array, Clock};
-pub use error::RecordingError;
+pub use error::{FieldFault, RecordingError};
 pub use names::tidy_column;
 pub use options::{DateOrder, ReadOptions, TimeUnit};
 pub use recording::{Recording, is_format_note};

@@ -91,9 +91,8 @@ impl Recording {
             return Self::unpacked(reader, name, options);
         }
         if options.episode.is_some() && format != Format::Parquet {
-            let problem =
-                "it holds no episodes; remove the # and the number from its name".to_owned();
-            return Err(RecordingError::Format { file: name.to_owned(), format: "file", problem });
+            let problem = "it holds no episodes; remove the # and the number from its name";
+            return Err(RecordingError::format(name, "file", problem));
         }
         if format == Format::Text {
             return text::read(reader, name, options, packed);
@@ -110,8 +109,8 @@ impl Recording {
         let (mut reader, packed) = Unpacked::new(reader);
         let (head, format) = sniff::head(&mut reader, name)?;
         if format == Format::Gzip {
-            let problem = "it is packed twice; unpack it once with gunzip".to_owned();
-            return Err(RecordingError::Format { file: name.to_owned(), format: "gzip", problem });
+            let problem = "it is packed twice; unpack it once with gunzip";
+            return Err(RecordingError::format(name, "gzip", problem));
         }
         let all = &mut Cursor::new(head).chain(reader);
         Self::read_format(format, all, name, options, Some(&packed))

@@ -87,12 +87,11 @@ impl Format {
         options: &ReadOptions,
         packed: Option<&Packed>,
     ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
-        let refused =
-            |format, problem| RecordingError::Format { file: file.to_owned(), format, problem };
+        let refused = |format, problem: &str| RecordingError::format(file, format, problem);
         let mut whole = || {
             let read = room::whole(reader, packed);
             let read = read.map_err(|e| RecordingError::io(file, "read it", e))?;
-            read.map_err(|problem| refused("file", problem))
+            read.map_err(|problem| refused("file", &problem))
         };
         match self {
             Self::Npy => npy::read(whole()?, file, options),
@@ -102,8 +101,8 @@ impl Format {
             #[cfg(not(feature = "parquet"))]
             Self::Parquet => Err(RecordingError::convert(file, "a Parquet file", "parquet")),
             Self::Python(format, extra) => Err(RecordingError::convert(file, format, extra)),
-            Self::Foreign(format, todo) => Err(refused(format, todo.to_owned())),
-            Self::Text | Self::Gzip => Err(refused("text", "it holds no arrays".to_owned())),
+            Self::Foreign(format, todo) => Err(refused(format, todo)),
+            Self::Text | Self::Gzip => Err(refused("text", "it holds no arrays")),
         }
     }
 }

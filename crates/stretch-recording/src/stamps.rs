@@ -2,33 +2,25 @@
 
 use std::borrow::Cow;
 
-use crate::DateOrder;
-
-/// Reason why a text is not a time stamp.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum StampFault {
-    Unknown,
-    /// It is unclear which number is the day and which the month.
-    DayOrMonth,
-}
+use crate::{DateOrder, FieldFault};
 
 /// Returns a time stamp in nanoseconds: since 1970 for a date, since midnight for a time of day. A date without a time
 /// zone is in UTC. The day comes first if points separate the numbers of a date and `order` is `None`.
-pub(crate) fn nanoseconds(text: &str, order: Option<DateOrder>) -> Result<i128, StampFault> {
+pub(crate) fn nanoseconds(text: &str, order: Option<DateOrder>) -> Result<i128, FieldFault> {
     use jiff::{Timestamp, civil::DateTime, civil::Time, tz::TimeZone};
     if let Ok(stamp) = text.parse::<Timestamp>() {
         return Ok(stamp.as_nanosecond());
     }
     // A date without a time of day is not the time of a sample, but the parser below would take it for midnight.
     if !text.contains(':') {
-        return Err(StampFault::Unknown);
+        return Err(FieldFault::Stamp);
     }
     let (date, time) = match text.split_once([' ', 'T']) {
         Some((date, time)) if !date.contains(':') => (Some(date), time.trim_start()),
         _ => (None, text),
     };
     let mut time = of_day(time);
-    let unknown = |_| StampFault::Unknown;
+    let unknown = |_| FieldFault::Stamp;
     let Some(date) = date else {
         // A text with one colon and a fraction is minutes and seconds, because only seconds have a fraction.
         if time.contains('.') && time.matches(':').count() == 1 {
@@ -66,9 +58,9 @@ fn of_day(time: &str) -> Cow<'_, str> {
 }
 
 /// Splits a numeric date into year, month and day.
-fn numbered(date: &str, order: Option<DateOrder>) -> Result<(u32, u32, u32), StampFault> {
+fn numbered(date: &str, order: Option<DateOrder>) -> Result<(u32, u32, u32), FieldFault> {
     let parts: Option<Vec<u32>> = date.split(['.', '/', '-']).map(|p| p.parse().ok()).collect();
-    let Some([first, second, last]) = parts.as_deref() else { return Err(StampFault::Unknown) };
+    let Some([first, second, last]) = parts.as_deref() else { return Err(FieldFault::Stamp) };
     if *first > 31 {
         return Ok((*first, *second, *last));
     }
@@ -83,7 +75,7 @@ fn numbered(date: &str, order: Option<DateOrder>) -> Result<(u32, u32, u32), Sta
     match order.or(shown) {
         Some(DateOrder::DayFirst) => Ok((year, *second, *first)),
         Some(DateOrder::MonthFirst) => Ok((year, *first, *second)),
-        None => Err(StampFault::DayOrMonth),
+        None => Err(FieldFault::DayOrMonth),
     }
 }
 

@@ -87,7 +87,7 @@ impl Recording {
         if let Some(Array { name: array, shape, .. }) = arrays.iter().find(unfit) {
             let problem =
                 format!("the number of values of array {array} does not match its shape {shape:?}");
-            return Err(RecordingError::Format { file: name.to_owned(), format: "array", problem });
+            return Err(RecordingError::format(name, "array", problem));
         }
         let (tracks, notes) = tracks(name, arrays, notes, options)?;
         let clocks = tracks.iter().map(|track| {
@@ -238,7 +238,7 @@ pub(crate) fn tracks(
                 "one rate is given for several time arrays ({}); name one with --time, or give no rate",
                 listed(&names)
             );
-            return Err(RecordingError::Format { file: file.to_owned(), format: "array", problem });
+            return Err(RecordingError::format(file, "array", problem));
         };
         notes.push(note_on_rate(Some(&array.name), rate_hz, "as given by the option"));
         let stamps = Stamps::at_rate(array.values.len(), rate_hz);
@@ -359,12 +359,12 @@ fn counted(
     let samples = others.iter().filter_map(Array::matrix).map(|(r, c)| r.max(c)).max();
     let (Some(rate_hz), Some(samples)) = (options.sample_rate_hz.or(own), samples) else {
         let names: Vec<&str> = others.iter().map(|a| a.name.as_str()).collect();
-        let hint = format!(
-            "save it as an array {} together with the others ({}), or give its rate with --time 100hz",
+        let problem = format!(
+            "there is no time; save it as an array {} together with the others ({}), or give its rate with --time 100hz",
             &options.time,
             listed(&names)
         );
-        return Err(RecordingError::NoTime { file: file.to_owned(), hint });
+        return Err(RecordingError::unusable(file, problem));
     };
     let said = if options.sample_rate_hz.is_some() {
         "as given by the option"

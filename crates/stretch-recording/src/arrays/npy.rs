@@ -22,7 +22,7 @@ pub(crate) fn read(
     file: &str,
     options: &ReadOptions,
 ) -> Result<Tracks, RecordingError> {
-    let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "NPY", problem };
+    let fail = |problem: String| RecordingError::format(file, "NPY", problem);
     let mut arrays = parse(&bytes, "", options, &mut room).map_err(fail)?.map_err(fail)?;
     drop(bytes);
     if let (Some(names), [array]) = (&options.columns, &mut arrays[..]) {
@@ -52,14 +52,13 @@ pub(crate) fn read_archive(
     file: &str,
     options: &ReadOptions,
 ) -> Result<Tracks, RecordingError> {
-    let fail = |problem| RecordingError::Format { file: file.to_owned(), format: "NPZ", problem };
+    let fail = |problem: String| RecordingError::format(file, "NPZ", problem);
     let broken = |e: zip::result::ZipError| {
         fail(format!("the archive is broken: {e}; save it again with numpy.savez"))
     };
     // The names of the members are not compressed, so they can also be read in a broken archive.
     if let Some((format, todo)) = foreign(&bytes) {
-        let problem = todo.to_owned();
-        return Err(RecordingError::Format { file: file.to_owned(), format, problem });
+        return Err(RecordingError::format(file, format, todo));
     }
     let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;
     let (mut arrays, mut other) = (Vec::new(), Vec::new());

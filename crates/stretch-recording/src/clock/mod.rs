@@ -260,7 +260,7 @@ fn leave_out(
                 "{count} of {all} rows have bad time stamps, and at most one in five may be left out; split the recording where its time begins again"
             ),
         };
-        return Err(RecordingError::Stamps { at, problem: format!("{evidence}: {why}") });
+        return Err(bad_stamps(&at, &format!("{evidence}: {why}")));
     }
     notes.push(match count {
         1 => format!("row {} is left out: {evidence}", at.row),
@@ -282,7 +282,12 @@ fn never_rises(file: &str, stamps: &Stamps) -> RecordingError {
     let still =
         || (stamps.place(file, 1), format!("time does not advance at {}", stamps.recorded(1)));
     let (at, problem) = goes_back(file, stamps).unwrap_or_else(still);
-    RecordingError::Stamps { at, problem }
+    bad_stamps(&at, &problem)
+}
+
+fn bad_stamps(at: &Place, problem: &str) -> RecordingError {
+    let problem = format!("{problem}; to replace the time column by a rate, give --sample-rate HZ");
+    RecordingError::unusable(at, problem)
 }
 
 #[cfg(test)]

@@ -58,15 +58,13 @@ pub(super) fn decide(
     let is_whole = || stamps.counts.iter().all(|t| t.fract() == 0.0);
     let is_slow = unit == TimeUnit::Seconds && rate_hz <= 1.0 && stamps.counts.len() >= TELLING;
     if is_slow && USUAL_HZ.contains(&rate_hz) && (named.is_none() || is_whole()) {
-        let column = stamps.name.clone();
-        let column_ms = format!("{}_ms", column.strip_suffix("_s").unwrap_or(&column));
-        return Err(RecordingError::SlowSeconds {
-            file: file.to_owned(),
-            step: steps.sample,
-            rate_hz,
-            column,
-            column_ms,
-        });
+        let column = &stamps.name;
+        let column_ms = format!("{}_ms", column.strip_suffix("_s").unwrap_or(column));
+        let (step, rate_hz_if_ms) = (steps.sample, 1e3 * rate_hz);
+        let problem = format!(
+            "its times go up by {step} from sample to sample: that is {rate_hz} samples a second if they are seconds and {rate_hz_if_ms} if they are milliseconds; say which with --time {column}:s or {column}:ms, or rename it {column_ms}"
+        );
+        return Err(RecordingError::unusable(format!("{file}, column {column}"), problem));
     }
     Ok(unit.per_second())
 }
@@ -140,7 +138,11 @@ pub(crate) fn check_range(
     if range.contains(&rate_hz) {
         return Ok(());
     }
-    let (file, column) = (file.to_owned(), column.to_owned());
-    let (least_hz, most_hz) = (*range.start(), *range.end());
-    Err(RecordingError::Rate { file, column, rate_hz, least_hz, most_hz })
+    let problem = format!(
+        "its time stamps give {rate_hz:.3e} samples per second, which is not between {:e} and {:e}; give their unit with --time {column}:s, :ms, \
+         :us, :ns, :min, :h or :d, or replace them by a rate with --sample-rate HZ",
+        range.start(),
+        range.end()
+    );
+    Err(RecordingError::unusable(format!("{file}, column {column}"), problem))
 }

@@ -28,8 +28,7 @@ pub(crate) fn read(
     file: &str,
     options: &ReadOptions,
 ) -> Result<(Vec<Track>, Vec<String>), RecordingError> {
-    let fail =
-        |problem| RecordingError::Format { file: file.to_owned(), format: "Parquet", problem };
+    let fail = |problem: String| RecordingError::format(file, "Parquet", problem);
     let broken = |e: ParquetError| fail(format!("{e}; write it again, or export it as CSV"));
     let reader = SerializedFileReader::new(Bytes::from(bytes)).map_err(broken)?;
     let schema = reader.metadata().file_metadata().schema_descr_ptr();
@@ -57,7 +56,7 @@ pub(crate) fn read(
     lerobot::name(Path::new(file), &mut channels);
     let track = on_its_clock(file, channels, &stamps, options, &mut notes)?;
     if track.stamps.counts.is_empty() {
-        return Err(RecordingError::HeaderOnly { file: file.to_owned() });
+        return Err(RecordingError::header_only(file));
     }
     let track = lerobot::episode(track, options.episode, &mut notes).map_err(fail)?;
     Ok((vec![track], notes))

@@ -1,6 +1,6 @@
 //! Columns of numbers that are filled row by row.
 
-use stretch_data::{Channel, DataError, Place};
+use stretch_data::{Channel, Place};
 
 use crate::{
     ReadOptions, RecordingError,
@@ -8,7 +8,7 @@ use crate::{
     grid::{Track, is_needed, sparse},
     text::bad_rows::BadRows,
     text::header::Header,
-    text::row::{Fault, Role, RowFault},
+    text::row::{Role, RowFault},
 };
 
 /// Names of the channels that the project's format of trial files defines.
@@ -165,18 +165,9 @@ pub(crate) fn located(file: &str, row: u64, header: &Header, fault: RowFault) ->
         RowFault::Ragged { found, expected } => {
             RecordingError::Ragged { file, row, found, expected }
         }
-        RowFault::Field { column, fault } => {
+        RowFault::Field { column, fault: (fault, value) } => {
             let at = Place { file, row, column: header.label(column) };
-            match fault {
-                Fault::NotANumber(value) => RecordingError::NotANumber { at, value },
-                Fault::Empty => RecordingError::EmptyField { at },
-                Fault::DecimalComma(value) => RecordingError::DecimalComma { at, value },
-                Fault::NotFinite(value) => DataError::NotFinite { at, value }.into(),
-                Fault::Quote => RecordingError::Quote { at },
-                Fault::DecimalPoint(value) => RecordingError::DecimalPoint { at, value },
-                Fault::Stamp(value) => RecordingError::TimeStamp { at, value },
-                Fault::DayOrMonth(value) => RecordingError::DayOrMonth { at, value },
-            }
+            RecordingError::Field { at, value, fault }
         }
     }
 }

@@ -5,8 +5,8 @@ use std::borrow::Cow;
 use stretch_data::shown;
 
 use crate::{
-    DateOrder,
-    stamps::{StampFault, looks_like_stamp, nanoseconds, order_of},
+    DateOrder, FieldFault,
+    stamps::{looks_like_stamp, nanoseconds, order_of},
     text::header::Header,
     text::row::{Fault, Field, Role, RowFault, field, is_finite, number, numbers},
 };
@@ -140,7 +140,7 @@ impl Dialect {
         if self.mark == Mark::Open {
             let marked = cells.iter().find_map(|cell| match number(cell) {
                 Ok(_) => cell.contains(&b'.').then_some(Mark::Point),
-                Err(Fault::DecimalComma(_)) => Some(Mark::Comma),
+                Err((FieldFault::DecimalComma, _)) => Some(Mark::Comma),
                 Err(_) => None,
             });
             self.mark = marked.unwrap_or(Mark::Open);
@@ -171,7 +171,7 @@ impl Dialect {
             out[column] = match value {
                 Ok(value) => value,
                 // Refuse a row with the other notation, because it is unclear which numbers of the file use which.
-                Err(fault @ Fault::DecimalPoint(_)) => {
+                Err(fault @ (FieldFault::DecimalPoint, _)) => {
                     return Err(RowFault::Field { column, fault });
                 }
                 Err(fault) if role == Role::Welcome || self.may_be_blank(&fault, column) => {
@@ -186,22 +186,20 @@ impl Dialect {
 
     /// Returns whether a needed column may lack a value in this row. Any column but the time may, because it may have a
     /// separate clock.
-    fn may_be_blank(&self, fault: &Fault, column: usize) -> bool {
-        matches!(fault, Fault::Empty | Fault::NotFinite(_)) && Some(column) != self.time
+    fn may_be_blank(&self, (fault, _): &Fault, column: usize) -> bool {
+        matches!(fault, FieldFault::Empty | FieldFault::NotFinite) && Some(column) != self.time
     }
 
     fn stamp(&mut self, cell: &[u8], first: Option<i128>) -> Result<f64, Fault> {
-        let ns = nanoseconds(&text(cell), self.date_order).map_err(|fault| match fault {
-            StampFault::Unknown => Fault::Stamp(shown(cell)),
-            StampFault::DayOrMonth => Fault::DayOrMonth(shown(cell)),
-        })?;
+        let ns = nanoseconds(&text(cell), self.date_order);
+        let ns = ns.map_err(|fault| (fault, shown(cell)))?;
         let first = first.unwrap_or(ns);
         self.clock = Clock::Stamps(Some(first));
         Ok((ns - first) as f64 / 1e9)
     }
 
     fn count(&mut self, cell: &[u8], first: Option<i128>) -> Result<f64, Fault> {
-        let count = whole(cell).ok_or_else(|| Fault::NotANumber(shown(cell)))?;
+        let count = whole(cell).ok_or_else(|| (FieldFault::NotANumber, shown(cell)))?;
         let first = first.unwrap_or(count);
         self.clock = Clock::Counts(Some(first));
         Ok((count - first) as f64)
@@ -210,10 +208,10 @@ impl Dialect {
     fn number(&self, cell: &[u8]) -> Result<f64, Fault> {
         match self.mark {
             Mark::Comma if cell.contains(&b'.') && number(cell).is_ok() => {
-                Err(Fault::DecimalPoint(shown(cell)))
+                Err((FieldFault::DecimalPoint, shown(cell)))
             }
             Mark::Comma if cell.contains(&b',') => {
-                number(&with_point(cell)).map_err(|_| Fault::NotANumber(shown(cell)))
+                number(&with_point(cell)).map_err(|_| (FieldFault::NotANumber, shown(cell)))
             }
             _ => number(cell),
         }
@@ -286,7 +284,7 @@ fn broken(line: &[u8], delimiter: u8) -> RowFault {
         }
         (column, at) = (column + 1, end + 1);
     }
-    RowFault::Field { column, fault: Fault::Quote }
+    RowFault::Field { column, fault: (FieldFault::Quote, String::new()) }
 }
 
 /// Whether a cell is a number in either notation, or a time stamp.

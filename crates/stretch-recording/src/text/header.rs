@@ -36,9 +36,12 @@ impl Header {
         let (mut renamed, asked) = (Vec::new(), options.asked());
         for (column, cell) in cells.iter().enumerate() {
             if cell.contains(char::is_control) {
-                let column = (column + 1).to_string();
+                let (column, value) = ((column + 1).to_string(), shown(cell.as_bytes()));
+                let problem = format!(
+                    "the name \"{value}\" holds a control character; if the lines end in CR alone, save the file with LF"
+                );
                 let at = Place { file: file.to_owned(), row, column };
-                return Err(RecordingError::ControlCharacter { at, value: shown(cell.as_bytes()) });
+                return Err(RecordingError::unusable(at, problem));
             }
             // A serial monitor also writes the time of day before the header line.
             if looks_like_stamp(cell) {
@@ -52,10 +55,10 @@ impl Header {
             }
             // If several columns have the default name of the time, the first of them is the time.
             if asked.contains(&cell) && cell != TIME {
-                return Err(RecordingError::DuplicateColumn {
-                    file: file.to_owned(),
-                    column: cell.clone(),
-                });
+                let problem = format!(
+                    "the header names column {cell} twice; ask for {cell}.0 or {cell}.1, the first and the second of them"
+                );
+                return Err(RecordingError::unusable(file, problem));
             }
             names[column] = format!("{cell}.{before}");
             renamed.push(format!("{cell} (column {}) -> {cell}.{before}", column + 1));

@@ -46,11 +46,8 @@ pub(crate) fn read(
                 Some(packed) => (Room::beside(packed.get()), "gzip"),
                 None => (Room::of_text(), "text"),
             };
-            room.take_numbers(numbers).map_err(|problem| RecordingError::Format {
-                file: file.to_owned(),
-                format,
-                problem,
-            })?;
+            let taken = room.take_numbers(numbers);
+            taken.map_err(|problem| RecordingError::format(file, format, problem))?;
         }
     }
     table.finish(options)
@@ -183,7 +180,7 @@ impl<'a> Table<'a> {
         let good = tracks.iter().map(|t| t.stamps.counts.len()).max().unwrap_or(good);
         notes.extend(bad.finish(file, good)?);
         if good == 0 {
-            return Err(RecordingError::HeaderOnly { file: file.to_owned() });
+            return Err(RecordingError::header_only(file));
         }
         let is_kept = |name: &str| tracks.iter().flat_map(|t| &t.channels).any(|c| c.name == name);
         let names = self.header.names.iter().enumerate();

@@ -2,21 +2,13 @@
 
 use stretch_data::shown;
 
+use crate::FieldFault;
+
 /// Words that tables contain in place of a missing number.
 const MISSING: [&str; 5] = ["na", "n/a", "#n/a", "null", "none"];
 
-/// What is wrong with one field or one row, before its place is known.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Fault {
-    NotANumber(String),
-    Empty,
-    DecimalComma(String),
-    NotFinite(String),
-    Quote,
-    DecimalPoint(String),
-    Stamp(String),
-    DayOrMonth(String),
-}
+/// What is wrong with one field, and the field, shortened, before its place is known.
+pub(crate) type Fault = (FieldFault, String);
 
 /// What is wrong with a row.
 #[derive(Debug, Clone, PartialEq)]
@@ -114,18 +106,22 @@ pub(crate) fn is_finite(content: &[u8]) -> bool {
 pub(crate) fn number(content: &[u8]) -> Result<f64, Fault> {
     match fast_float2::parse::<f64, _>(content) {
         Ok(value) if value.is_finite() => Ok(value),
-        Ok(_) => Err(Fault::NotFinite(shown(content))),
-        Err(_) if content.is_empty() => Err(Fault::Empty),
-        Err(_) if MISSING.iter().any(|word| content.eq_ignore_ascii_case(word.as_bytes())) => {
-            Err(Fault::NotFinite(shown(content)))
-        }
-        Err(_) => {
-            let pointed: Vec<u8> =
-                content.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
-            if pointed != content && fast_float2::parse::<f64, _>(&pointed).is_ok() {
-                return Err(Fault::DecimalComma(shown(content)));
-            }
-            Err(Fault::NotANumber(shown(content)))
-        }
+        parsed => Err((fault_of(content, parsed.is_ok()), shown(content))),
+    }
+}
+
+/// Says why a field is no finite number.
+fn fault_of(content: &[u8], is_parsed: bool) -> FieldFault {
+    let is_word = |word: &&str| content.eq_ignore_ascii_case(word.as_bytes());
+    if content.is_empty() {
+        return FieldFault::Empty;
+    }
+    if is_parsed || MISSING.iter().any(is_word) {
+        return FieldFault::NotFinite;
+    }
+    let pointed: Vec<u8> = content.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
+    match pointed != content && fast_float2::parse::<f64, _>(&pointed).is_ok() {
+        true => FieldFault::DecimalComma,
+        false => FieldFault::NotANumber,
     }
 }

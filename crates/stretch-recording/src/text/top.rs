@@ -150,7 +150,8 @@ impl Finder<'_> {
 
     fn take(&mut self, file: &str, row: u64, line: &[u8]) -> Result<(), RecordingError> {
         if line.starts_with(b"\xff\xfe") || line.starts_with(b"\xfe\xff") {
-            return Err(RecordingError::Utf16 { file: file.to_owned() });
+            let problem = "the text is UTF-16; save the file with the encoding UTF-8";
+            return Err(RecordingError::unusable(file, problem));
         }
         let is_decoded = std::str::from_utf8(line).is_err();
         let text = if is_decoded { windows_1252(line).into_bytes() } else { line.to_vec() };
@@ -416,8 +417,12 @@ impl Finder<'_> {
 
     /// The error for lines without a table.
     fn no_table(&self, file: &str) -> RecordingError {
-        let file = file.to_owned();
-        let Some(first) = self.lines.first() else { return RecordingError::Empty { file } };
+        let Some(first) = self.lines.first() else {
+            return RecordingError::unusable(
+                file,
+                "the file is empty; it needs a header line with the names of its columns, then one row per sample",
+            );
+        };
         let counted = self.lines.iter().find_map(|line| {
             let (delimiter, _) =
                 self.separator(&line.text, |_| true).filter(|_| !line.is_comment)?;
@@ -425,17 +430,28 @@ impl Finder<'_> {
             cells.pop_if(|last| last.is_empty());
             Some((line.row, cells.len()))
         });
-        match (&self.options.columns, counted) {
-            (Some(names), Some((row, found))) if found != names.len() => {
-                RecordingError::Named { file, row, found, given: names.len() }
-            }
-            _ => RecordingError::NoNumbers {
-                file,
-                lines: self.lines.len(),
-                first: shown(&first.text),
-                is_one_column: self.lines.iter().any(|line| is_number(line.text.trim_ascii())),
-            },
+        if let (Some(names), Some((row, found))) = (&self.options.columns, counted)
+            && found != names.len()
+        {
+            let given = names.len();
+            let problem = format!(
+                "the row has {found} numbers, but --columns names {given}; give {found} names"
+            );
+            return RecordingError::unusable(format!("{file}, row {row}"), problem);
         }
+        let none = match self.lines.len() {
+            1 => "its first line is not".to_owned(),
+            lines => format!("none of its first {lines} lines is"),
+        };
+        let how = match self.lines.iter().any(|line| is_number(line.text.trim_ascii())) {
+            true => {
+                "each line has one number only: name the column and give the rate, such as --columns gauge_mv --time 100hz, or record the time as well"
+            }
+            false => "write one line per sample, with a separator between its numbers",
+        };
+        let first = shown(&first.text);
+        let problem = format!("{none} a row of numbers (the first is \"{first}\"); {how}");
+        RecordingError::unusable(file, problem)
     }
 
     /// The error for rows of numbers without names.
@@ -450,16 +466,15 @@ impl Finder<'_> {
             };
             format!("no names for them in the line above (\"{shown}\"{commas})")
         });
-        RecordingError::NoHeader {
-            file: file.to_owned(),
-            rows: match block.rows {
-                1 => "1 row".to_owned(),
-                rows => format!("{}{rows} rows", if is_whole { "" } else { "at least " }),
-            },
-            numbers: block.filled,
-            row: self.lines[block.start].row,
-            above,
-        }
+        let rows = match block.rows {
+            1 => "1 row".to_owned(),
+            rows => format!("{}{rows} rows", if is_whole { "" } else { "at least " }),
+        };
+        let (numbers, row) = (block.filled, self.lines[block.start].row);
+        let problem = format!(
+            "{rows} of {numbers} numbers from line {row} on, and {above}; name the columns with --columns, or put a header line above them, such as time_s,length_mm,bridge_v"
+        );
+        RecordingError::unusable(file, problem)
     }
 }
 

@@ -39,6 +39,8 @@ pub mod toolkit {
             leave_one_out,
         },
         judge::{Estimates, MAX_LAG_S, MOST_MISSING, Methods, cadence, evaluate_methods},
-        prepare::{even, even_signals, extent, noise, pooled_range, provenance, sample_rate_hz},
+        prepare::{
+            check_rate, even, even_signals, extent, noise, pooled_range, provenance, sample_rate_hz,
+        },
     };
 }

@@ -21,7 +21,7 @@ pub struct File {
 /// revision 2.2 (format 1.5).
 ///
 /// # Errors
-/// [`ExportError::Converter`] if the board's converter measures no part of a calibrated range.
+/// [`ExportError::Calibrate`] if the board's converter measures no part of a calibrated range.
 ///
 /// ```
 /// use stretch_calibrate::parse_adc;

@@ -98,12 +98,12 @@ impl Header {
     /// [`converter_reach`] does.
     ///
     /// # Errors
-    /// [`ExportError::Converter`] if the converter measures no part of a range.
+    /// [`ExportError::Calibrate`] if the converter measures no part of a range.
     pub fn converter_notes(&self) -> Result<Vec<String>, ExportError> {
         let notes =
             self.signals.iter().map(|(signal, range)| converter_reach(signal, *range, &self.adc));
         let notes: Result<Vec<_>, _> = notes.collect();
-        Ok(notes.map_err(ExportError::Converter)?.into_iter().flatten().collect())
+        Ok(notes?.into_iter().flatten().collect())
     }
 }
 
@@ -150,12 +150,7 @@ fn one(
             Ok(fixed)
         }
         // a model without an integer form may have one in floats; a converter that does not fit remains an error
-        Err(ExportError::NoFixedForm(
-            cause @ (CalibrateError::NoFixedForm { .. }
-            | CalibrateError::FixedRate { .. }
-            | CalibrateError::FixedStep { .. }
-            | CalibrateError::FixedRange { .. }),
-        )) => {
+        Err(ExportError::NoFixedForm(cause @ CalibrateError::NoFixedForm(_))) => {
             let mut float = float(calibration, turns, options)?;
             if options.form.is_some() {
                 return Err(ExportError::NoFixedForm(cause));
@@ -174,7 +169,7 @@ const NO_ZERO: &str =
 
 fn fixed(calibration: &Calibration, options: &Options) -> Result<Header, ExportError> {
     let record = fixed_record(calibration, &options.adc).map_err(|error| match error {
-        CalibrateError::OutsideConverter { .. } => ExportError::Converter(error),
+        CalibrateError::OutsideConverter(_) => ExportError::Calibrate(error),
         _ => ExportError::NoFixedForm(error),
     })?;
     let part = match &record.numbers {
@@ -201,14 +196,14 @@ fn float(
                 Model::History(_) => "the history model",
                 _ => "this model",
             };
-            return Err(ExportError::NoForm { model: model.into() });
+            return Err(ExportError::no_form(model));
         }
     };
     if let Some(turns) = turns {
         part = part.with_zero(calibration, turns);
     }
     let test = self_test::float(calibration)?;
-    let seal = calibration_seal(calibration).map_err(ExportError::NoRecord)?;
+    let seal = calibration_seal(calibration)?;
     Ok(assembled(Source::of(calibration, seal), options, Form::Float, part, &test))
 }
 
@@ -216,7 +211,7 @@ fn float(
 /// each gauge.
 ///
 /// # Errors
-/// `ExportError::FixedArray` if integers are requested, because several gauges have no integer form; also if the
+/// [`ExportError::Refused`] if integers are requested, because several gauges have no integer form; also if the
 /// calibration cannot be serialised, or if floats change the estimate too much.
 ///
 /// ```
@@ -233,7 +228,9 @@ pub fn array_header<const N: usize>(
     options: &Options,
 ) -> Result<Header, ExportError> {
     if options.form == Some(Form::Fixed) {
-        return Err(ExportError::FixedArray);
+        let problem =
+            "several gauges cannot be exported in integers: leave out --form, or give --form float";
+        return Err(ExportError::Refused(problem.to_owned()));
     }
     let signals: Vec<_> = calibration.spec().channels.iter().map(range_of).collect();
     let channels = signals.len();
@@ -242,7 +239,7 @@ pub fn array_header<const N: usize>(
         reference: &calibration.spec().reference,
         sample_rate: calibration.spec().sample_rate_hz,
         provenance: &calibration.spec().provenance,
-        seal: array_seal(calibration).map_err(ExportError::NoRecord)?,
+        seal: array_seal(calibration)?,
         target: Target::Direct,
     };
     let made = assembled(

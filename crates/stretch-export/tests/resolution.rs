@@ -44,7 +44,7 @@ fn integers_state_their_step_and_are_refused_where_it_exceeds_the_error_of_the_f
             assert!(error.contains(part), "{part}: {error}");
         }
         let error = fixed_record(&metres, &options(None).adc).unwrap_err();
-        assert!(matches!(error, CalibrateError::FixedStep { .. }), "{error}");
+        assert!(matches!(error, CalibrateError::NoFixedForm(_)), "{error}");
         // if no form is requested, the form with enough resolution is chosen
         let float = header(&metres, &options(None)).unwrap();
         assert_eq!((float.form, float.step), (Form::Float, None));

@@ -6,7 +6,7 @@ use stretch_effects::{
     Effect, EffectParameter, Extent, GAUGE, Grid, Live, Need, Place, Target, gauge_effect,
 };
 
-use crate::{CalibrateError, Cause, prepare::Prepared};
+use crate::{CalibrateError, Cause, PRESSURE, prepare::Prepared};
 
 /// One parameter of a defect.
 #[derive(Debug, Clone, Copy)]
@@ -78,7 +78,9 @@ impl Defects {
     pub(crate) fn of(prepared: &Prepared) -> Result<Self, CalibrateError> {
         let causes = &prepared.options.causes;
         if causes.is_empty() {
-            return Err(CalibrateError::NotDiagnosed);
+            let problem = "--model diagnosed needs the effects of the gauge or its reference: run stretch diagnose first and give its result with --from, \
+                 or fit --model observer";
+            return Err(CalibrateError::Refused(problem.to_owned()));
         }
         let falls = matches!(prepared.target, Polarity::Contraction { .. });
         let pressures = prepared.series.iter().flat_map(|s| s.pressure.iter().copied());
@@ -91,9 +93,10 @@ impl Defects {
         let needs =
             |effect: &&(&Effect, Live)| effect.0.needs == Some(Need::Pressure) && pressure == 0.0;
         if let Some((effect, _)) = all.named.iter().find(needs) {
-            let effect = effect.name.to_owned();
-            let trial = prepared.first_trial.clone();
-            return Err(CalibrateError::NoPressure { effect, trial });
+            return Err(CalibrateError::Refused(format!(
+                "{} needs the pressure, and {} has no column {PRESSURE}; record it, or leave the effect out",
+                effect.name, prepared.first_trial
+            )));
         }
         Ok(all)
     }
@@ -103,7 +106,10 @@ impl Defects {
         let Some((effect, live)) = known else {
             let known = GAUGE.iter().filter(|e| e.live.is_some()).map(|e| e.name);
             let known = known.collect::<Vec<_>>().join(", ");
-            return Err(CalibrateError::UnknownCause { effect: cause.effect.clone(), known });
+            return Err(CalibrateError::Refused(format!(
+                "{} is not an effect of the gauge or its reference; a calibration can use {known}",
+                cause.effect
+            )));
         };
         if self.named.iter().any(|(e, _)| e.name == effect.name) {
             return Ok(());

@@ -133,7 +133,10 @@ pub(crate) fn surfaces(
         let branch = prepared.target.branch_name(branch);
         let (samples, terms) = (raw.len() as u64, degree.terms());
         if samples <= terms as u64 {
-            return Err(CalibrateError::OneBranch { branch, samples, terms });
+            return Err(CalibrateError::Refused(format!(
+                "the {branch} branch (one direction of motion) has only {samples} samples for the {terms} terms of the model; add trials that move in \
+                 this direction, or fit --model curve or --model linear, which have no branches"
+            )));
         }
     }
     let [up, down] = raw;

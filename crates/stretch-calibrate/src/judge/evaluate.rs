@@ -7,6 +7,7 @@ use stretch_metrics::{Agreement, Delta, PairedBlocks, PairedT, TTest, lag};
 
 use crate::{
     CalibrateError,
+    error::PACE_TOLERANCE,
     prepare::{MOST_ROWS, extent, polarity, sample_rate_hz},
 };
 
@@ -146,7 +147,7 @@ pub struct Methods<'a> {
 ///
 /// # Errors
 /// [`CalibrateError::Data`] if a trial lacks signal or reference, or if the trials have more than
-/// [`MOST_ROWS`](crate::MOST_ROWS) rows, [`CalibrateError::NothingEstimated`] for a trial that is shorter than the
+/// [`MOST_ROWS`](crate::MOST_ROWS) rows, [`CalibrateError::Refused`] for a trial that is shorter than the
 /// warm-up, or has a lower sample rate than the calibration.
 pub fn evaluate(
     calibrations: &[(&str, &Calibration)],
@@ -221,12 +222,8 @@ pub fn evaluate_methods(
         for ((name, method), pooled) in names.iter().zip(&methods).zip(&mut pooled) {
             let tally = Tally::of(&reference, method, period_s, all.most_s);
             pooled.merge(&tally);
-            let nothing = || CalibrateError::NothingEstimated {
-                trial: trial.name.clone(),
-                rate_hz,
-                expected_hz: all.rate_hz,
-            };
-            errors.push(tally.errors(name).ok_or_else(nothing)?);
+            let errors_of = tally.errors(name);
+            errors.push(errors_of.ok_or_else(|| nothing_estimated(trial, rate_hz, all.rate_hz))?);
         }
         tests.push(&reference, &methods);
         rows.push(TrialErrors {
@@ -248,6 +245,20 @@ pub fn evaluate_methods(
         pooled: pooled.collect::<Result<_, _>>()?,
         comparisons: tests.compare(names),
     })
+}
+
+/// Explains why no sample of a trial has an estimate. If samples come more slowly than a calibration expects, samples
+/// are missing between them, and the rate estimator restarts at each sample.
+fn nothing_estimated(trial: &Trial, rate_hz: f64, expected_hz: f64) -> CalibrateError {
+    let why = match (expected_hz / rate_hz - 1.0).abs() > PACE_TOLERANCE {
+        true => format!(
+            "it has {rate_hz:.4} samples a second, but the calibration needs {expected_hz}: resample it (stretch convert --grid {expected_hz})"
+        ),
+        false => {
+            "it is shorter than the warm-up of the rate estimator: use a longer trial".to_owned()
+        }
+    };
+    CalibrateError::Refused(format!("{}: no sample has an estimate; {why}", trial.name))
 }
 
 /// Shifts an angle that wraps, whose turn is unknown, to the turn of the first calibration's estimates. The methods

@@ -30,10 +30,9 @@ pub(crate) struct Series {
 /// Returns the median sample rate of a trial, in hertz.
 ///
 /// # Errors
-/// [`CalibrateError::TooShort`] for fewer than two samples.
+/// [`CalibrateError::too_short`] for fewer than two samples.
 pub fn sample_rate_hz(trial: &Trial) -> Result<f64, CalibrateError> {
-    let too_short = || CalibrateError::TooShort { trial: trial.name.clone(), samples: trial.len() };
-    let hz = trial.rate_hz().ok_or_else(too_short)?;
+    let hz = trial.rate_hz().ok_or_else(|| CalibrateError::too_short(trial))?;
     // Time stamps are printed to the millisecond, so 100.0000001 Hz means 100 Hz.
     let whole = hz.round();
     Ok(if (hz - whole).abs() < 1e-3 * hz && whole > 0.0 { whole } else { hz })
@@ -218,8 +217,7 @@ pub fn rated(
     let columns: Vec<&str> = std::iter::once(signal).chain(others.iter().copied()).collect();
     let even = even(trial, &columns, 1, sample_rate)?;
     if even.parts.is_empty() {
-        let (trial, samples) = (trial.name.clone(), trial.len());
-        return Err(CalibrateError::TooShort { trial, samples });
+        return Err(CalibrateError::too_short(trial));
     }
     let noise = noise(even.parts.iter().map(|part| part.columns[0].as_slice()));
     let dead_band = 3.0 * noise * noise_gain(estimator, sample_rate)?;

@@ -53,7 +53,10 @@ pub(crate) struct Prepared {
 impl Prepared {
     pub(crate) fn new(trials: &[Trial], options: &Options) -> Result<Self, CalibrateError> {
         if options.signal == options.reference {
-            return Err(CalibrateError::SameColumn { column: options.signal.clone() });
+            return Err(CalibrateError::Refused(format!(
+                "{} is both the signal and the reference, but a calibration needs two columns: choose another column, or record a reference, such as length_mm, in the same file",
+                options.signal
+            )));
         }
         let (sample_rate, Evened { pieces, rows, mut notes, .. }) = Evened::of(trials, options)?;
         notes.extend(rows.note());
@@ -164,8 +167,7 @@ impl Evened {
             evened.take(index, trial, (&first.name, sample_rate), options)?;
         }
         if evened.pieces.is_empty() {
-            let (trial, samples) = (first.name.clone(), first.len());
-            return Err(CalibrateError::TooShort { trial, samples });
+            return Err(CalibrateError::too_short(first));
         }
         if let Some(turn) = evened.turn
             && let Some(moved) = align_turns(&mut evened.pieces, turn)
@@ -187,11 +189,7 @@ impl Evened {
         (first, sample_rate): (&str, SampleRate),
         options: &Options,
     ) -> Result<(), CalibrateError> {
-        let (rate_hz, first_hz) = (sample_rate_hz(trial)?, sample_rate.hz());
-        if (rate_hz / first_hz - 1.0).abs() > 0.05 {
-            let (trial, first) = (trial.name.clone(), first.to_owned());
-            return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz });
-        }
+        check_rate(trial, first, sample_rate)?;
         let mut columns = vec![options.signal.as_str(), options.reference.as_str()];
         // The column is added only if the pressure was recorded. If it is missing, a later error names the cause that
         // needs it.
@@ -238,10 +236,30 @@ fn most_rows(model: ModelKind) -> usize {
     if matches!(model, ModelKind::Remembering { .. }) { MOST_REMEMBERED } else { MOST_ROWS }
 }
 
+/// Checks that a trial has the sample rate of the `first` one.
+///
+/// # Errors
+/// [`CalibrateError::Refused`] for rates that differ by more than 5 %: such trials cannot share an estimator.
+pub fn check_rate(
+    trial: &Trial,
+    first: &str,
+    sample_rate: SampleRate,
+) -> Result<(), CalibrateError> {
+    let (rate_hz, first_hz) = (sample_rate_hz(trial)?, sample_rate.hz());
+    if (rate_hz / first_hz - 1.0).abs() <= 0.05 {
+        return Ok(());
+    }
+    Err(CalibrateError::Refused(format!(
+        "{} was sampled at {rate_hz:.4} Hz and {first} at {first_hz:.4} Hz; resample one of them (stretch convert --grid {first_hz:.4}), or \
+         calibrate them separately",
+        trial.name
+    )))
+}
+
 /// Resamples a trial to an even time grid. The first `signals` of its columns must not wrap.
 ///
 /// # Errors
-/// [`CalibrateError::WrappedSignal`], and [`CalibrateError::Data`] for a missing column.
+/// [`CalibrateError::Refused`] for a signal that wraps, and [`CalibrateError::Data`] for a missing column.
 pub fn even(
     trial: &Trial,
     columns: &[&str],
@@ -253,10 +271,11 @@ pub fn even(
     let even = trial.even(columns, spec)?;
     let mut turns = columns.iter().zip(&even.turns).take(signals);
     match turns.find_map(|(column, turn)| Some((column, (*turn)?))) {
-        Some((column, turn)) => {
-            let (trial, column) = (trial.name.clone(), (*column).to_owned());
-            Err(CalibrateError::WrappedSignal { trial, column, turn })
-        }
+        Some((column, turn)) => Err(CalibrateError::Refused(format!(
+            "{}: the signal {column} jumps by {turn} between neighbouring samples, because it is an angle that wraps; unwrap it before you calibrate \
+             and before you apply the calibration, or move its zero so that the motion stays within one turn",
+            trial.name
+        ))),
         None => Ok(even),
     }
 }

@@ -52,11 +52,10 @@ pub struct FixedRecord {
 /// [`FixedCalibration`], observers a [`FixedObserver`].
 ///
 /// # Errors
-/// [`CalibrateError::FixedBits`] for a converter of more than 16 bits, [`CalibrateError::NoFixedForm`] for any other
-/// model, [`CalibrateError::FixedRate`] for a rate estimator for which no type was compiled (an observer needs none),
-/// [`CalibrateError::OutsideConverter`] if all of the trials' signal lies outside the converter,
-/// [`CalibrateError::FixedStep`] if a step of an estimate ([`FIXED_STEP`]) exceeds the fit's error,
-/// [`CalibrateError::FixedRange`] if the reference in such steps exceeds 32 bits,
+/// [`CalibrateError::Refused`] for a converter of more than 16 bits, [`CalibrateError::NoFixedForm`] for any other
+/// model, for a rate estimator for which no type was compiled (an observer needs none), if a step of an estimate
+/// ([`FIXED_STEP`]) exceeds the fit's error, and if the reference in such steps exceeds 32 bits,
+/// [`CalibrateError::OutsideConverter`] if all of the trials' signal lies outside the converter, and
 /// [`CalibrateError::Fixed`] if a number does not fit its format.
 ///
 /// ```
@@ -77,20 +76,27 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
     let note = converter_reach(&spec.signal, range, adc)?;
     let bits = adc.spec().bits;
     if bits > FIXED_BITS {
-        return Err(CalibrateError::FixedBits { bits });
+        return Err(CalibrateError::Refused(format!(
+            "codes of a converter of {bits} bits are too large for 32-bit integers: export in float (stretch export --c DIR --form float), or give \
+             the board the upper 16 bits of each code (--adc 16,ZERO,FULL_SCALE)"
+        )));
     }
-    let none = |model: String| Err(CalibrateError::NoFixedForm { model });
+    let none = |model: &str| {
+        Err(CalibrateError::NoFixedForm(format!(
+            "{model} has no integer form for a board; calibrate with --model linear, poly13, observer or observer+rest"
+        )))
+    };
     match &calibration.spec().model {
         Model::Linear(_) | Model::Observer(_) => {}
         Model::Surfaces { inflation, deflation } => {
             let mut branches = [inflation, deflation].into_iter();
             if let Some(branch) = branches.find(|b| b.surface.as_poly13().is_none()) {
-                return none(branch.surface.degree().to_string());
+                return none(&branch.surface.degree().to_string());
             }
         }
-        Model::History(_) => return none("the history model".into()),
-        Model::Diagnosed(_) => return none("the diagnosed model".into()),
-        _ => return none("this model".into()),
+        Model::History(_) => return none("the history model"),
+        Model::Diagnosed(_) => return none("the diagnosed model"),
+        _ => return none("this model"),
     }
     if FIXED_STEP > fit_error(calibration) {
         return Err(too_coarse(calibration));
@@ -98,8 +104,12 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
     let ends = [spec.target_range.min(), spec.target_range.max()];
     let [low, high] = ends.map(|end| spec.target.to_reference(end).abs());
     if low.max(high) / FIXED_STEP > f64::from(i32::MAX) {
-        let reference = spec.reference.clone();
-        return Err(CalibrateError::FixedRange { reference, largest: low.max(high) });
+        return Err(CalibrateError::NoFixedForm(format!(
+            "in integers the estimate of {0} is in thousandths of its unit, and {1} of that unit do not fit 32 bits: convert {0} to a larger unit, \
+             such as kN instead of N, and calibrate again",
+            spec.reference,
+            in_digits(low.max(high), 4)
+        )));
     }
     if !matches!(calibration.spec().model, Model::Observer(_)) {
         return Ok(FixedRecord { note, ..rated(calibration, adc)? });
@@ -137,15 +147,16 @@ pub fn converter_reach(
     let codes = (max - min) / adc.volts_per_code();
     let is_outside = max < zero_v || full_scale_v < min;
     if is_outside || codes < LEAST_CODES {
-        let (signal, codes) = (signal.clone(), if is_outside { 0.0 } else { codes });
-        return Err(CalibrateError::OutsideConverter {
-            signal,
-            min,
-            max,
-            zero_v,
-            full_scale_v,
-            codes,
-        });
+        let few = match is_outside {
+            true => String::new(),
+            false => format!(", in which the signal has only {codes:.1} codes"),
+        };
+        return Err(CalibrateError::OutsideConverter(format!(
+            "the signal {signal} of the trials is between {} and {}, but the converter measures from {zero_v} to {full_scale_v}{few}: this is not \
+             the board's converter; {GIVE_ADC}",
+            in_digits(min, 4),
+            in_digits(max, 4)
+        )));
     }
     // a hundredth of the range is not worth a note
     let beyond = (zero_v - min).max(max - full_scale_v) > 0.01 * (max - min);
@@ -169,12 +180,15 @@ const FEW_CODES: f64 = 16.0;
 const LEAST_CODES: f64 = 2.0;
 
 /// What to do about a converter that does not fit the signal.
-pub(crate) const GIVE_ADC: &str = "give it with --adc BITS,ZERO,FULL_SCALE in the unit of the signal column, \
+const GIVE_ADC: &str = "give it with --adc BITS,ZERO,FULL_SCALE in the unit of the signal column, \
                                    such as 12,0,3.3 for volts or 10,0,1023 for counts of 10 bits";
 
 fn too_coarse(calibration: &Calibration) -> CalibrateError {
-    let reference = calibration.spec().reference.clone();
-    CalibrateError::FixedStep { reference, error: fit_error(calibration) }
+    let (reference, error) = (&calibration.spec().reference, fit_error(calibration));
+    CalibrateError::NoFixedForm(format!(
+        "in integers the estimate of {reference} has steps of {FIXED_STEP} in its unit, which are too coarse for a calibration with an error of \
+         {error:.2e}: convert {reference} to a smaller unit, such as mm instead of m, and calibrate again"
+    ))
 }
 
 /// Returns the RMSE of a calibration's fit in the unit of its reference, but at least a thousandth of the range,
@@ -218,8 +232,11 @@ macro_rules! windows {
                 )*
                 rate => {
                     let windows: Vec<_> = WINDOWS.iter().map(u16::to_string).collect();
-                    let (rate, windows) = (format!("{rate:?}"), windows.join(", "));
-                    Err(CalibrateError::FixedRate { rate, windows })
+                    Err(CalibrateError::NoFixedForm(format!(
+                        "the rate estimator {rate:?} has no integer form for a board; calibrate with --rate savgol:WINDOW,DEGREE of degree 1 or 2, \
+                         window {}, without delay",
+                        windows.join(", ")
+                    )))
                 }
             }
         }

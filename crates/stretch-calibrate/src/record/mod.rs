@@ -9,7 +9,6 @@ pub use file::{
     calibration_bytes, calibration_from_edited_json, calibration_from_json, calibration_seal,
     calibration_to_json, is_postcard, read_calibration, write_calibration,
 };
-pub(crate) use fixed::GIVE_ADC;
 pub use fixed::{
     BoardReceptor, FIXED_STEP, FixedRecord, RecordNumbers, converter_reach, fit_error,
     fixed_record, parse_adc,

@@ -113,7 +113,10 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
     let receptor = StretchReceptor::<f32>::new(calibration)?;
     let RateEstimator::SavitzkyGolay { window, degree, delay } = calibration.spec().rate_estimator
     else {
-        return Err(ExportError::Rate { rate: format!("{:?}", calibration.spec().rate_estimator) });
+        return Err(ExportError::Refused(format!(
+            "the rate estimator {:?} cannot be exported to C; calibrate with --rate savgol:WINDOW,DEGREE such as savgol:11,2",
+            calibration.spec().rate_estimator
+        )));
     };
     let [window, degree, delay] = [window, degree.into(), delay].map(usize::from);
     let shape = SgShape { window, degree, order: 1, delay };
@@ -167,7 +170,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             ("curve", include_str!("../c/curve_float.h"))
         }
         Map::Surface([ranged, _]) => {
-            return Err(ExportError::NoForm { model: ranged.surface.degree().to_string() });
+            return Err(ExportError::no_form(&ranged.surface.degree().to_string()));
         }
     };
     Ok(Part {

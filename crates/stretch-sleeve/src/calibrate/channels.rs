@@ -3,7 +3,7 @@
 
 use stretch_calibrate::{
     CalibrateError, MOST_ROWS,
-    toolkit::{SETTLE, States, even, extent, sample_rate_hz},
+    toolkit::{SETTLE, States, check_rate, even, extent, sample_rate_hz},
 };
 use stretch_core::SampleRate;
 use stretch_data::{Trial, check_rows};
@@ -66,8 +66,7 @@ impl Channels {
             all.take(index, trial, signals, reference, &first.name)?;
         }
         if all.stretches.is_empty() {
-            let (trial, samples) = (first.name.clone(), first.len());
-            return Err(CalibrateError::TooShort { trial, samples }.into());
+            return Err(CalibrateError::too_short(first).into());
         }
         all.check(signals)?;
         Ok(all)
@@ -89,11 +88,7 @@ impl Channels {
         reference: &str,
         first: &str,
     ) -> Result<(), SleeveError> {
-        let (rate_hz, first_hz) = (sample_rate_hz(trial)?, self.sample_rate.hz());
-        if (rate_hz / first_hz - 1.0).abs() > 0.05 {
-            let (trial, first) = (trial.name.clone(), first.to_owned());
-            return Err(CalibrateError::SampleRates { trial, rate_hz, first, first_hz }.into());
-        }
+        check_rate(trial, first, self.sample_rate)?;
         let (trial, note) = without_an_open_end(trial, reference)?;
         self.notes.extend(note);
         let mut columns: Vec<&str> = signals.iter().map(String::as_str).collect();

@@ -7,7 +7,7 @@ use stretch_data::{Channel, Trial};
 use stretch_fit::{Sample, SurfaceAccumulator};
 use stretch_sim::{Key, Rig, RunSettings, Session, TrialPlan};
 use stretch_sleeve::{
-    ArrayCalibration, ArrayOptions, GaugeCalibration, LiveGauge, MAX_CHANNELS, SleeveCalibration,
+    ArrayCalibration, GaugeCalibration, LiveGauge, MAX_CHANNELS, SleeveCalibration, SleeveOptions,
     apply_array, apply_gauge, calibrate_array, calibrate_gauge,
 };
 
@@ -68,10 +68,10 @@ impl Worn {
 
     fn calibrated(&mut self) -> ArrayCalibration<MAX_CHANNELS> {
         let trials: Vec<Trial> = (0..FITTED).map(|_| self.next()).collect();
-        let options = ArrayOptions {
+        let options = SleeveOptions {
             signals: (0..GAUGES).map(name).collect(),
             reference: "length_mm".into(),
-            ..ArrayOptions::default()
+            ..SleeveOptions::default()
         };
         let fit = calibrate_array(&trials, &options).expect("a calibration");
         match fit.calibration {

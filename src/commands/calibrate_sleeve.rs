@@ -9,8 +9,8 @@ use stretch_calibrate::copied_signals;
 use stretch_data::files::{Outputs, is_standard_output};
 use stretch_data::{Split, Trial, unit_of};
 use stretch_sleeve::{
-    ArrayOptions, Carried, Prior, Session, SessionOptions, SleeveCalibration, SleeveError,
-    UpdateOptions, UpdateSummary, calibrate_array,
+    Carried, Prior, Session, SleeveCalibration, SleeveError, SleeveFit, SleeveOptions,
+    UpdateSummary, calibrate_array,
 };
 
 use super::{
@@ -78,10 +78,11 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
     let signals = if named.is_empty() { other_columns(&trials, &references)? } else { named };
     let of_trials = |error: SleeveError| of_files(error, &args.trials);
-    let one = |reference: &String| match &prior {
-        Some(prior) => update(prior, &trials, &signals, reference, &args.of),
-        None => fit(&trials, &signals, reference, args.rest_length),
+    let options = |reference: &str| SleeveOptions {
+        rest_length: args.rest_length,
+        ..SleeveOptions::new(signals.clone(), reference).of(&args.of)
     };
+    let one = |reference: &String| make(prior.as_ref(), &trials, options(reference));
     let made: Result<Vec<Made>, _> = references.iter().map(one).collect();
     let mut made = made.map_err(of_trials)?;
     made.first_mut()
@@ -97,9 +98,9 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         outputs.file(path, |out| out.write_all(&record))?;
     }
     if let Some(path) = &args.session {
-        let options = SessionOptions::new(signals.clone(), &references[0]).of(&args.of);
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        let (session, _) = Session::new(&name, &trials, &options).map_err(of_trials)?;
+        let (session, _) =
+            Session::new(&name, &trials, &options(&references[0])).map_err(of_trials)?;
         stage_text(&mut outputs, path, &session.to_json()?)?;
     }
     let answer = match &made[..] {
@@ -113,54 +114,25 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     })
 }
 
-/// Updates a prior by trials.
-fn update(
-    prior: &Prior,
+/// Updates a prior by trials, or fits gauges to them.
+fn make(
+    prior: Option<&Prior>,
     trials: &[Trial],
-    signals: &[String],
-    reference: &str,
-    of: &str,
+    options: SleeveOptions,
 ) -> Result<Made, SleeveError> {
-    let options = UpdateOptions {
-        signals: signals.to_vec(),
-        reference: reference.to_owned(),
-        ..UpdateOptions::of(of)
+    let (calibration, own, update, notes) = match prior {
+        Some(prior) => {
+            let SleeveFit { calibration, summary, notes } = prior.update(trials, &options)?;
+            (calibration, None, Some(summary), notes)
+        }
+        None => {
+            let SleeveFit { calibration, summary, notes } = calibrate_array(trials, &options)?;
+            (calibration, Some(summary), None, notes)
+        }
     };
-    let updated = prior.update(trials, &options)?;
-    Ok(Made {
-        calibration: updated.calibration,
-        reference: options.reference,
-        signals: options.signals,
-        rmse: None,
-        carried: Vec::new(),
-        update: Some(updated.summary),
-        notes: updated.notes,
-    })
-}
-
-/// Fits several gauges to trials.
-fn fit(
-    trials: &[Trial],
-    signals: &[String],
-    reference: &str,
-    rest_length: Option<f64>,
-) -> Result<Made, SleeveError> {
-    let options = ArrayOptions {
-        signals: signals.to_vec(),
-        reference: reference.to_owned(),
-        rest_length,
-        date: String::new(),
-    };
-    let fit = calibrate_array(trials, &options)?;
-    Ok(Made {
-        calibration: fit.calibration,
-        reference: options.reference,
-        signals: options.signals,
-        rmse: Some(fit.rmse),
-        carried: fit.carried,
-        update: None,
-        notes: fit.notes,
-    })
+    let (rmse, carried) = own.map_or((None, Vec::new()), |own| (Some(own.rmse), own.carried));
+    let SleeveOptions { reference, signals, .. } = options;
+    Ok(Made { calibration, reference, signals, rmse, carried, update, notes })
 }
 
 /// Returns the path for the calibration file of one of several references: wrist.json becomes

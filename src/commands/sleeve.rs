@@ -8,7 +8,8 @@ use stretch_data::Split;
 use stretch_data::files::Outputs;
 use stretch_recording::ReadOptions;
 use stretch_sleeve::{
-    Assumed, Expected, Prior, RenewOptions, Renewed, Session, SleeveCalibration, SleeveError,
+    Assumed, Expected, Prior, RenewSummary, Session, SleeveCalibration, SleeveError, SleeveFit,
+    SleeveOptions,
 };
 
 use super::{
@@ -139,18 +140,20 @@ fn renew(args: RenewArgs) -> anyhow::Result<()> {
     let trials = read_trials(&args.trials, Split::Fit, &columns);
     let own = "the prior needs these columns: rename them, and convert their units, with stretch convert --column NEW=OLD*FACTOR";
     let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
-    let options =
-        RenewOptions { signals: signals.clone(), calibration, ..RenewOptions::of(&args.of) };
-    let renewed = prior.renew(&trials, &options).map_err(|error| match &args.calibration {
-        Some(path) if matches!(error, SleeveError::OtherPrior) => {
-            of_files(error, std::slice::from_ref(path))
-        }
-        _ => of_files(error, &args.trials),
-    })?;
+    let options = SleeveOptions::new(signals.clone(), &prior.reference).of(&args.of);
+    let renewed =
+        prior.renew(&trials, &options, calibration.as_ref()).map_err(|error| {
+            match &args.calibration {
+                Some(path) if matches!(error, SleeveError::OtherPrior) => {
+                    of_files(error, std::slice::from_ref(path))
+                }
+                _ => of_files(error, &args.trials),
+            }
+        })?;
     let mut outputs = Outputs::default();
     let record = renewed.calibration.bytes(&args.out)?;
     outputs.file(&args.out, |out| out.write_all(&record))?;
-    let Renewed { summary, notes, .. } = &renewed;
+    let SleeveFit { summary, notes, .. } = &renewed;
     let answer = json!({ "signals": signals, "renewal": summary, "notes": notes });
     args.json.conclude(outputs, &answer, || {
         print_renewal(&renewed, &prior.unit())?;
@@ -158,7 +161,7 @@ fn renew(args: RenewArgs) -> anyhow::Result<()> {
     })
 }
 
-fn print_renewal(renewed: &Renewed, unit: &str) -> anyhow::Result<()> {
+fn print_renewal(renewed: &SleeveFit<RenewSummary>, unit: &str) -> anyhow::Result<()> {
     let summary = &renewed.summary;
     say(
         "Without a reference, the ends and the rest of the movement are assumed to be those of earlier sessions:",

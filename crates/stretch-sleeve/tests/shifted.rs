@@ -2,7 +2,7 @@
 
 use stretch_data::{Channel, Trial};
 use stretch_sleeve::{
-    ArrayCalibration, ArrayOptions, MAX_CHANNELS, SleeveCalibration, apply_array, calibrate_array,
+    ArrayCalibration, MAX_CHANNELS, SleeveCalibration, SleeveOptions, apply_array, calibrate_array,
 };
 use testkit::random::Random;
 
@@ -59,10 +59,10 @@ impl Sleeve {
 
     fn calibrated(&mut self) -> ArrayCalibration<MAX_CHANNELS> {
         let trials: Vec<Trial> = (0..3).map(|_| self.record(60.0, (0, 0.0))).collect();
-        let options = ArrayOptions {
+        let options = SleeveOptions {
             signals: (0..self.gauges.len()).map(|k| format!("s{k}")).collect(),
             reference: "angle_deg".into(),
-            ..ArrayOptions::default()
+            ..SleeveOptions::default()
         };
         match calibrate_array(&trials, &options).unwrap().calibration {
             SleeveCalibration::Many(many) => *many,

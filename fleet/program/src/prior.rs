@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use rayon::{iter::Either, prelude::*};
 use stretch_data::Trial;
-use stretch_sleeve::{Expected, Prior, Session, SessionOptions};
+use stretch_sleeve::{Expected, Prior, Session, SleeveOptions};
 
 use crate::{
     data_sets::{By, Name, data_sets, lake_with_trials, trials},
@@ -99,6 +99,6 @@ fn levels_above<'a>(names: impl Iterator<Item = &'a Name> + Clone) -> usize {
 fn session(lake: &Lake, name: &Name, above: usize, files: &[&LakeFile]) -> anyhow::Result<Session> {
     let recorded: Vec<Trial> = trials(files)?.into_iter().map(|t| t.trial).collect();
     let of = name[above..LEVELS.len()].join("/");
-    let options = SessionOptions::new([&*lake.about.signal], &lake.about.reference).of(&of);
+    let options = SleeveOptions::new([&*lake.about.signal], &lake.about.reference).of(&of);
     Ok(Session::new(&name.join("/"), &recorded, &options)?.0)
 }

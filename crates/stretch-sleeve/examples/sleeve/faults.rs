@@ -3,7 +3,7 @@
 
 use stretch_data::Trial;
 use stretch_sleeve::{
-    ArrayCalibration, MAX_CHANNELS, SleeveCalibration, UpdateOptions, apply_array,
+    ArrayCalibration, MAX_CHANNELS, SleeveCalibration, SleeveOptions, apply_array,
 };
 
 use crate::judge::{Judge, first_seconds};
@@ -37,7 +37,7 @@ pub(crate) fn print(judge: &Judge, every: usize) -> anyhow::Result<()> {
         let Some(prior) = judge.without(&wearer)?.all else { continue };
         for worn in judge.set.worn.iter().filter(|w| w.wearer == wearer).step_by(every) {
             let short = first_seconds(&worn.trials, 60.0);
-            let updated = prior.update(&short, &UpdateOptions::default())?;
+            let updated = prior.update(&short, &SleeveOptions::default())?;
             let SleeveCalibration::Many(calibration) = updated.calibration else { continue };
             let trial = &worn.trials[0];
             let applied = apply_array(&calibration, trial)?;

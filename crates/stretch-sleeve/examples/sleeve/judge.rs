@@ -4,8 +4,8 @@ use stretch_calibrate::{Options, apply, calibrate, choose_model, rank_signals};
 use stretch_core::Calibration;
 use stretch_data::Trial;
 use stretch_sleeve::{
-    ArrayOptions, GaugeCalibration, Prior, RenewOptions, Session, SessionOptions,
-    SleeveCalibration, SleeveError, UpdateOptions, apply_array, calibrate_array,
+    GaugeCalibration, Prior, Session, SleeveCalibration, SleeveError, SleeveOptions, apply_array,
+    calibrate_array,
 };
 
 use crate::data::{Set, Worn};
@@ -74,7 +74,7 @@ impl Judge {
         let (signals, reference) = (set.signals.clone(), set.reference.clone());
         set.worn.retain(|worn| {
             let path = format!("{}/{}", worn.wearer, worn.activity);
-            let options = SessionOptions::new(signals.clone(), &reference).of(&path);
+            let options = SleeveOptions::new(signals.clone(), &reference).of(&path);
             match Session::new(&worn.name, &worn.trials, &options) {
                 Ok((session, _)) => sessions.push(session),
                 Err(refusal) => {
@@ -211,9 +211,9 @@ impl Judge {
                 true => Some(of_accepted(own, |own| prior.knowing(own))?),
                 false => None,
             };
-            let told = UpdateOptions::of(&format!("{}/{}", worn.wearer, worn.activity));
+            let told = SleeveOptions::default().of(&format!("{}/{}", worn.wearer, worn.activity));
             let cases = [
-                ("new wearer", Some(prior), UpdateOptions::default()),
+                ("new wearer", Some(prior), SleeveOptions::default()),
                 ("next session", knowing.as_ref(), told),
             ];
             for (who, prior, options) in cases {
@@ -224,10 +224,9 @@ impl Judge {
                 } else {
                     self.set.signals.clone()
                 };
-                let options = UpdateOptions { signals: signals.clone(), ..options };
-                let renewing =
-                    RenewOptions { path: options.path.clone(), signals, ..RenewOptions::default() };
-                let error = match prior.renew(&first_seconds(&worn.trials, 60.0), &renewing) {
+                let options = SleeveOptions { signals, ..options };
+                let seconds = first_seconds(&worn.trials, 60.0);
+                let error = match prior.renew(&seconds, &options, None) {
                     Ok(renewed) => self.error(&renewed.calibration, worn)?,
                     Err(refusal) => {
                         eprintln!("{}: {refusal}", worn.name);
@@ -262,16 +261,18 @@ impl Judge {
                 }
             }
         }
-        let own = ArrayOptions {
+        let own = SleeveOptions {
             signals: self.set.signals.clone(),
             reference: self.set.reference.clone(),
-            ..ArrayOptions::default()
+            ..SleeveOptions::default()
         };
         let fit = calibrate_array(&worn.trials, &own)?;
-        errors.push((OWN_ONE.to_owned(), fit.carried[place].rmse_alone.unwrap_or(f64::NAN)));
-        let best = fit.carried.iter().filter_map(|c| c.rmse_alone).fold(f64::INFINITY, f64::min);
+        errors
+            .push((OWN_ONE.to_owned(), fit.summary.carried[place].rmse_alone.unwrap_or(f64::NAN)));
+        let best =
+            fit.summary.carried.iter().filter_map(|c| c.rmse_alone).fold(f64::INFINITY, f64::min);
         errors.push(("own calibration, best one".to_owned(), best));
-        errors.push((OWN_ALL.to_owned(), fit.rmse));
+        errors.push((OWN_ALL.to_owned(), fit.summary.rmse));
         Ok(Row { errors, inside })
     }
 

@@ -3,7 +3,7 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use stretch_data::{Channel, Trial};
-use stretch_sleeve::{ArrayOptions, SleeveCalibration, apply_array, calibrate_array};
+use stretch_sleeve::{SleeveCalibration, SleeveOptions, apply_array, calibrate_array};
 
 const HZ: f64 = 100.0;
 const GAUGES: usize = 5;
@@ -33,10 +33,10 @@ pub(crate) fn print(hours: f64) -> anyhow::Result<()> {
         let random = ChaCha8Rng::seed_from_u64(SEED);
         let mut body = Body { random, moving: [0.0, 0.0, 0.0, 1.0], slow: [0.0; GAUGES], noise };
         let calibrated = body.trial(CALIBRATED_S);
-        let options = ArrayOptions {
+        let options = SleeveOptions {
             signals: (1..=GAUGES).map(|k| format!("s{k}")).collect(),
             reference: "angle_deg".into(),
-            ..ArrayOptions::default()
+            ..SleeveOptions::default()
         };
         let SleeveCalibration::Many(calibration) =
             calibrate_array(std::slice::from_ref(&calibrated), &options)?.calibration

@@ -10,19 +10,18 @@ mod channels;
 mod error;
 mod gauge;
 mod linear;
+mod options;
 mod prior;
 mod record;
 mod turns;
 
 pub use array::{
-    AppliedArray, ArrayFit, ArrayOptions, Carried, apply_array, calibrate_array, evaluate_arrays,
+    AppliedArray, ArraySummary, Carried, apply_array, calibrate_array, evaluate_arrays,
 };
 pub use error::SleeveError;
 pub use gauge::{AppliedGauge, LiveGauge, apply_gauge};
-pub use prior::{
-    Assumed, Expected, Prior, RenewOptions, RenewSummary, Renewed, Session, SessionOptions,
-    UpdateOptions, UpdateSummary, Updated,
-};
+pub use options::{SleeveFit, SleeveOptions};
+pub use prior::{Assumed, Expected, Prior, RenewSummary, Session, UpdateSummary};
 pub use record::{
     RecordSummary, SleeveCalibration, array_bytes, array_seal, describe_record, seal_record,
 };

@@ -9,7 +9,7 @@ use stretch_core::{Interval, Normalisation, Target};
 use stretch_data::Trial;
 
 use crate::{
-    SleeveCalibration, SleeveError,
+    SleeveError, SleeveFit, SleeveOptions,
     calibrate::{channels::Channels, linear::Linear},
 };
 
@@ -22,30 +22,13 @@ use super::{
 /// Note on data that are too short to show the usual differences between channels.
 const TOO_SHORT: &str = "the trials are too short to detect later whether a gauge has shifted relative to the others: record at least a minute";
 
-/// Options of [`calibrate_array`].
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct ArrayOptions {
-    /// Columns of the signals.
-    pub signals: Vec<String>,
-    /// Column of the reference.
-    pub reference: String,
-    /// Resting length, as [`Options::rest_length`](stretch_calibrate::Options::rest_length).
-    pub rest_length: Option<f64>,
-    /// Date of the calibration as free text, which is stored with it.
-    pub date: String,
-}
-
-/// A calibration of several gauges with its errors.
+/// Errors of a calibration of several gauges.
 #[derive(Debug, Clone)]
-pub struct ArrayFit {
-    /// The calibration.
-    pub calibration: SleeveCalibration,
+pub struct ArraySummary {
     /// The contribution of each channel.
     pub carried: Vec<Carried>,
     /// Root mean square error on data left out, in the reference's unit.
     pub rmse: f64,
-    /// Notes on the data.
-    pub notes: Vec<String>,
 }
 
 /// Fits one linear model of all channels and their memories.
@@ -57,7 +40,10 @@ pub struct ArrayFit {
 ///
 /// # Errors
 /// [`SleeveError`], which names the trial and column.
-pub fn calibrate_array(trials: &[Trial], options: &ArrayOptions) -> Result<ArrayFit, SleeveError> {
+pub fn calibrate_array(
+    trials: &[Trial],
+    options: &SleeveOptions,
+) -> Result<SleeveFit<ArraySummary>, SleeveError> {
     let channels = Channels::new(trials, &options.signals, &options.reference)?;
     let undetermined = || CalibrateError::Undetermined { model: "array".into() };
     let longest = extent(channels.reference()).max;
@@ -108,10 +94,9 @@ pub fn calibrate_array(trials: &[Trial], options: &ArrayOptions) -> Result<Array
     }
     let columns = options.signals.iter().chain([&options.reference]);
     let provenance = provenance(&options.date, trials, columns);
-    Ok(ArrayFit {
+    Ok(SleeveFit {
         calibration: linear.record(Some(&channels), shifts, provenance)?,
-        carried,
-        rmse: held.rmse * unit,
+        summary: ArraySummary { carried, rmse: held.rmse * unit },
         notes,
     })
 }

@@ -7,7 +7,7 @@ mod shifts;
 mod watch;
 
 pub use apply::{AppliedArray, apply_array, evaluate_arrays};
-pub use fit::{ArrayFit, ArrayOptions, calibrate_array};
+pub use fit::{ArraySummary, calibrate_array};
 pub use parted::Carried;
 
 pub(crate) use watch::{Still, watched};

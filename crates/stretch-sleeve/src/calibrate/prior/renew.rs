@@ -16,7 +16,7 @@ use stretch_calibrate::{
 use stretch_data::{Trial, unit_of};
 
 use crate::{
-    SleeveCalibration, SleeveError,
+    SleeveCalibration, SleeveError, SleeveFit, SleeveOptions,
     calibrate::{
         bank::Bank,
         channels::Channels,
@@ -27,7 +27,6 @@ use crate::{
 use super::{
     landmarks::{LANDMARKS, Landmark, NAMES, Place, expected, landmarks, passes, warmed_up},
     learnt::Prior,
-    session::parse_path,
     tree::Normal,
 };
 
@@ -36,39 +35,6 @@ use super::{
 const UNSEEN: f64 = 16.266;
 /// Smallest number of passes from one end to the other in a movement.
 const LEAST_PASSES: usize = 2;
-
-/// Options of [`Prior::renew`].
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct RenewOptions {
-    /// Path of the session: sensor, wearer and so on, about which the prior may have knowledge; empty for an unknown
-    /// one.
-    pub path: Vec<String>,
-    /// Columns of the signals in the prior's order; empty for the names in the prior.
-    pub signals: Vec<String>,
-    /// A calibration that [`Prior::update`] made from this prior for an earlier session; `None` to start from the
-    /// prior's knowledge of the path.
-    pub calibration: Option<SleeveCalibration>,
-    /// Date of the calibration as free text, which is stored with it.
-    pub date: String,
-}
-
-impl RenewOptions {
-    /// Options for a session that is named by a path such as `left/anna`.
-    pub fn of(path: &str) -> Self {
-        Self { path: parse_path(path), ..Self::default() }
-    }
-}
-
-/// A calibration that was renewed without a reference.
-#[derive(Debug, Clone)]
-pub struct Renewed {
-    /// The calibration.
-    pub calibration: SleeveCalibration,
-    /// The assumptions and the result.
-    pub summary: RenewSummary,
-    /// Notes on the data.
-    pub notes: Vec<String>,
-}
 
 /// Assumptions and result of a renewal.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -131,13 +97,18 @@ impl Prior {
     /// # Errors
     /// [`SleeveError::Prior`] if the data have other channels, another rate or another unit than the prior, contain no
     /// complete movement, or differ from all earlier sessions. The error states what to do.
-    pub fn renew(&self, trials: &[Trial], options: &RenewOptions) -> Result<Renewed, SleeveError> {
+    pub fn renew(
+        &self,
+        trials: &[Trial],
+        options: &SleeveOptions,
+        earlier: Option<&SleeveCalibration>,
+    ) -> Result<SleeveFit<RenewSummary>, SleeveError> {
         let signals = if options.signals.is_empty() { &self.signals } else { &options.signals };
         self.refuse_columns(signals, &self.reference)?;
         let channels = Channels::without_reference(trials, signals)?;
         self.refuse_signals(&channels)?;
         let undetermined = || CalibrateError::Undetermined { model: "prior".into() };
-        let (normal, known) = self.before(options)?;
+        let (normal, known) = self.before(&options.path, earlier)?;
         let values: Option<Vec<Landmark>> =
             (0..LANDMARKS).map(|k| expected(&self.landmarks, &options.path, k)).collect();
         let values = values.ok_or_else(undetermined)?;
@@ -151,7 +122,7 @@ impl Prior {
             found.is_some_and(|found| found.distance <= UNSEEN)
         };
         let may_be_reversed = mirrored.iter().any(is_seen);
-        self.refuse_unseen(distance, options, may_be_reversed)?;
+        self.refuse_unseen(distance, &options.path, may_be_reversed)?;
         let mut notes = channels.notes.clone();
         notes.extend(self.whom(&options.path, known));
         notes.extend(may_be_reversed.then(|| REVERSED.to_owned()));
@@ -161,7 +132,7 @@ impl Prior {
         let linear = self.linear(&after.mean, self.gram.clone(), variance);
         let linear = Linear { signals: signals.clone(), ..linear };
         let provenance = provenance(&options.date, trials, signals);
-        Ok(Renewed {
+        Ok(SleeveFit {
             calibration: linear.record(Some(&channels), None, provenance)?,
             summary: self.summary(
                 &normal.mean,
@@ -175,9 +146,13 @@ impl Prior {
     }
 
     /// Returns the coefficients before the renewal, and the number of known steps of the path.
-    fn before(&self, options: &RenewOptions) -> Result<(Normal, usize), SleeveError> {
-        let (normal, known) = self.of(&options.path);
-        let Some(calibration) = &options.calibration else { return Ok((normal, known)) };
+    fn before(
+        &self,
+        path: &[String],
+        earlier: Option<&SleeveCalibration>,
+    ) -> Result<(Normal, usize), SleeveError> {
+        let (normal, known) = self.of(path);
+        let Some(calibration) = earlier else { return Ok((normal, known)) };
         let linear = self.linear(&normal.mean, self.gram.clone(), self.noise);
         let weights = linear.weights_of(calibration).ok_or(SleeveError::OtherPrior)?;
         // Both the earlier and the new session differ from the mean of their wearer, each with the variance of a
@@ -249,15 +224,15 @@ impl Prior {
     fn refuse_unseen(
         &self,
         distance: f64,
-        options: &RenewOptions,
+        path: &[String],
         may_be_reversed: bool,
     ) -> Result<(), SleeveError> {
         if distance <= UNSEEN {
             return Ok(());
         }
-        let of = match options.path.is_empty() {
+        let of = match path.is_empty() {
             true => String::new(),
-            false => format!(" of {}", options.path.join("/")),
+            false => format!(" of {}", path.join("/")),
         };
         let why = match may_be_reversed {
             true => {

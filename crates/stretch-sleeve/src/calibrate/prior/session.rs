@@ -10,7 +10,7 @@ use stretch_core::{Interval, Target};
 use stretch_data::Trial;
 
 use crate::{
-    SleeveError,
+    SleeveError, SleeveOptions,
     calibrate::{
         array::Still,
         bank::Bank,
@@ -28,43 +28,6 @@ use super::{
 pub(crate) const SCHEMA: u32 = 1;
 /// Ends of the parts of a session, in seconds from its beginning. The last part is open-ended.
 pub(crate) const PARTS_S: [f64; 4] = [10.0, 20.0, 30.0, 60.0];
-
-/// Identity and columns of a session.
-///
-/// ```
-/// use stretch_sleeve::SessionOptions;
-/// let options = SessionOptions::new(["s1", "s2"], "angle_deg").of("left/anna");
-/// assert_eq!(options.path, ["left", "anna"]);
-/// ```
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SessionOptions {
-    /// Columns of the signals, in the order of the channels.
-    pub signals: Vec<String>,
-    /// Column of the reference.
-    pub reference: String,
-    /// Path of the session, from the coarsest to the finest step: the sensor, the wearer, the activity.
-    pub path: Vec<String>,
-}
-
-impl SessionOptions {
-    /// Creates options of a session whose sensor and wearer are unknown.
-    pub fn new<S: Into<String>>(signals: impl IntoIterator<Item = S>, reference: &str) -> Self {
-        let signals = signals.into_iter().map(Into::into).collect();
-        Self { signals, reference: reference.to_owned(), path: Vec::new() }
-    }
-
-    /// Sets the path of the session, such as `left/anna`, with as many steps as are known.
-    #[must_use]
-    pub fn of(self, path: &str) -> Self {
-        Self { path: parse_path(path), ..self }
-    }
-}
-
-/// Splits a path such as `left/anna` into its steps. Empty steps are left out.
-pub(crate) fn parse_path(path: &str) -> Vec<String> {
-    let steps = path.split('/').map(str::trim).filter(|step| !step.is_empty());
-    steps.map(str::to_owned).collect()
-}
 
 /// A session with a reference, as triangular factors of its rows of terms. They contain everything that a prior needs,
 /// and no samples.
@@ -114,7 +77,7 @@ impl Session {
     pub fn new(
         name: &str,
         trials: &[Trial],
-        options: &SessionOptions,
+        options: &SleeveOptions,
     ) -> Result<(Self, Vec<String>), SleeveError> {
         let channels = Channels::new(trials, &options.signals, &options.reference)?;
         let reference_range = extent(channels.reference());
@@ -315,7 +278,7 @@ mod tests {
                 channel("angle_deg", (0..n).map(|k| 3.0 * wave(k)).collect()),
             ],
         };
-        let options = SessionOptions::new(["s1"], "angle_deg");
+        let options = SleeveOptions::new(["s1"], "angle_deg");
         let session = Session::new("a", std::slice::from_ref(&trial), &options).unwrap().0;
         let wider = session.domains[0].iter();
         let wider = wider.map(|d| Interval { min: 1.5 * d.min - 0.3, max: 2.0 * d.max + 0.1 });

@@ -4,8 +4,8 @@ use stretch_calibrate::{Options, apply, calibrate};
 use stretch_data::{Channel, Trial};
 
 use crate::{
-    ArrayOptions, Prior, RenewOptions, Session, SessionOptions, SleeveCalibration, Turns,
-    UpdateOptions, UpdateSummary, apply_array, apply_gauge, calibrate_array, calibrate_gauge,
+    Prior, Session, SleeveCalibration, SleeveOptions, Turns, UpdateSummary, apply_array,
+    apply_gauge, calibrate_array, calibrate_gauge,
 };
 
 const HZ: f64 = 50.0;
@@ -58,7 +58,7 @@ fn summed(wearer: usize, number: usize, signals: &[&str]) -> Session {
 
 fn summed_of(simulated: Simulated, wearer: usize, number: usize, signals: &[&str]) -> Session {
     let trial = simulated(wearer, number, 90.0);
-    let options = SessionOptions::new(signals.to_vec(), "angle_deg").of(&format!("w{wearer}"));
+    let options = SleeveOptions::new(signals.to_vec(), "angle_deg").of(&format!("w{wearer}"));
     Session::new(&trial.name, std::slice::from_ref(&trial), &options).unwrap().0
 }
 
@@ -98,7 +98,7 @@ fn seconds_of_reference_and_a_wearer_that_was_seen_each_lower_the_error() {
     let of = |seconds: f64, wearer: usize, path: &str, test: &Trial| {
         let short = session(wearer, 0, seconds.max(1.0));
         let trials = if seconds > 0.0 { vec![short] } else { Vec::new() };
-        let updated = prior.update(&trials, &UpdateOptions::of(path)).unwrap();
+        let updated = prior.update(&trials, &SleeveOptions::default().of(path)).unwrap();
         (rmse(&updated.calibration, test), updated.summary)
     };
     let (alone, wide) = of(0.0, 9, "", &test);
@@ -125,7 +125,7 @@ fn seconds_of_reference_and_a_wearer_that_was_seen_each_lower_the_error() {
 fn levels_are_those_of_the_seconds_of_reference() {
     let prior = prior(&["s1"]);
     let turns = |trials: &[Trial]| {
-        let updated = prior.update(trials, &UpdateOptions::default()).unwrap();
+        let updated = prior.update(trials, &SleeveOptions::default()).unwrap();
         let SleeveCalibration::One(one) = updated.calibration else { panic!("one gauge") };
         one
     };
@@ -146,7 +146,7 @@ fn levels_are_those_of_the_seconds_of_reference() {
         let usual = Turns { sessions, limit: most * usual.scatter, ..usual };
         assert_eq!(Turns { reference_per_signal: slope, ..held }, usual);
         assert!((held.reference_per_signal / slope - 1.0).abs() < 0.2, "{held:?}, {slope}");
-        let renewed = prior.renew(&trials, &RenewOptions::default()).unwrap().calibration;
+        let renewed = prior.renew(&trials, &SleeveOptions::default(), None).unwrap().calibration;
         let SleeveCalibration::One(renewed) = renewed else { panic!("one gauge") };
         let renewed = *renewed.turns().unwrap();
         assert_eq!(Turns { reference_per_signal: slope, ..renewed }, usual);
@@ -204,7 +204,7 @@ fn a_prior_and_a_session_are_what_they_were_after_writing_and_reading() {
     std::fs::write(&path, &text).unwrap();
     let read = Prior::read(&path).unwrap();
     let trials = [session(9, 0, 10.0)];
-    let update = |p: &Prior| p.update(&trials, &UpdateOptions::default()).unwrap().calibration;
+    let update = |p: &Prior| p.update(&trials, &SleeveOptions::default()).unwrap().calibration;
     assert_eq!(update(&own), update(&read));
     std::fs::write(&path, text.replacen("\"noise\":", "\"noise\":1", 1)).unwrap();
     let error = Prior::read(&path).unwrap_err().to_string();
@@ -244,13 +244,13 @@ fn sorted_fields_of_a_prior_and_of_a_session_are_told_with_what_to_do() {
 #[test]
 fn data_of_another_kind_are_refused_with_what_to_do() {
     let prior = prior(&["s1"]);
-    let refused = |change: &dyn Fn(&mut Trial), options: UpdateOptions, says: &str| {
+    let refused = |change: &dyn Fn(&mut Trial), options: SleeveOptions, says: &str| {
         let mut trial = session(9, 0, 20.0);
         change(&mut trial);
         let error = prior.update(&[trial], &options).unwrap_err().to_string();
         assert!(error.contains(says), "{error}");
     };
-    let usual = UpdateOptions::default;
+    let usual = SleeveOptions::default;
     let scaled = |k: usize, by: f64| {
         move |t: &mut Trial| t.channels[k].values.iter_mut().for_each(|x| *x *= by)
     };
@@ -265,9 +265,9 @@ fn data_of_another_kind_are_refused_with_what_to_do() {
     refused(&turned, usual(), "swap the wires");
     let slower = |t: &mut Trial| t.time_s.iter_mut().for_each(|t| *t *= 2.0);
     refused(&slower, usual(), "--grid 50");
-    let two = UpdateOptions { signals: vec!["s1".into(), "s2".into()], ..usual() };
+    let two = SleeveOptions { signals: vec!["s1".into(), "s2".into()], ..usual() };
     refused(&|_| {}, two, "1 channels (s1), but 2 were given");
-    let radian = UpdateOptions { reference: "angle_rad".into(), ..usual() };
+    let radian = SleeveOptions { reference: "angle_rad".into(), ..usual() };
     refused(&|_| {}, radian, "stretch convert");
     let few = Prior::learn(&[summed(0, 0, &["s1"])]).unwrap_err().to_string();
     assert!(few.contains("at least 3"), "{few}");
@@ -278,30 +278,31 @@ fn a_reference_that_ends_early_and_one_that_hardly_moves_are_told() {
     let prior = prior(&["s1"]);
     let mut early = session(9, 0, 20.0);
     early.channels[2].values[600..].iter_mut().for_each(|x| *x = f64::NAN);
-    let updated = prior.update(&[early], &UpdateOptions::default()).unwrap();
+    let updated = prior.update(&[early], &SleeveOptions::default()).unwrap();
     assert!(updated.notes.iter().any(|n| n.contains("ends at 11.98 s")), "{:?}", updated.notes);
     assert_eq!(updated.summary.seconds, 12.0);
     let still = session(9, 0, 0.4);
-    let updated = prior.update(&[still], &UpdateOptions::default()).unwrap();
+    let updated = prior.update(&[still], &SleeveOptions::default()).unwrap();
     assert!(updated.notes.iter().any(|n| n.contains("move over the whole range")));
 }
 
 #[test]
 fn channels_together_err_less_than_the_best_and_a_lost_one_is_bearable() {
     let trials: Vec<Trial> = (0..3).map(|number| session(2, number, 60.0)).collect();
-    let options = ArrayOptions {
+    let options = SleeveOptions {
         signals: vec!["s1".into(), "s2".into()],
         reference: "angle_deg".into(),
-        ..ArrayOptions::default()
+        ..SleeveOptions::default()
     };
     let fit = calibrate_array(&trials, &options).unwrap();
-    let best = fit.carried.iter().filter_map(|c| c.rmse_alone).fold(f64::INFINITY, f64::min);
-    assert!(fit.rmse < 0.8 * best, "{} beside {best}", fit.rmse);
+    let best =
+        fit.summary.carried.iter().filter_map(|c| c.rmse_alone).fold(f64::INFINITY, f64::min);
+    assert!(fit.summary.rmse < 0.8 * best, "{} beside {best}", fit.summary.rmse);
     let mut lost = session(2, 1, 30.0);
     let whole = rmse(&fit.calibration, &lost);
     lost.channels[0].values.iter_mut().skip(500).for_each(|x| *x = f64::NAN);
     let without = rmse(&fit.calibration, &lost);
-    let second = ArrayOptions { signals: vec!["s2".into()], ..options.clone() };
+    let second = SleeveOptions { signals: vec!["s2".into()], ..options.clone() };
     let alone = calibrate_array(&trials, &second).unwrap();
     assert!(whole < without && without < 1.1 * rmse(&alone.calibration, &lost).max(whole));
     let copied = {
@@ -321,25 +322,27 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
         trial
     };
     let test = session(9, 0, 60.0);
-    let alone = prior.update(&[], &UpdateOptions::default()).unwrap().calibration;
-    let renewed = prior.renew(&[without(test.clone())], &RenewOptions::default()).unwrap();
+    let alone = prior.update(&[], &SleeveOptions::default()).unwrap().calibration;
+    let renewed = prior.renew(&[without(test.clone())], &SleeveOptions::default(), None).unwrap();
     let (before, after) = (rmse(&alone, &test), rmse(&renewed.calibration, &test));
     assert!(after < 0.5 * before, "{after} beside {before}");
     assert!(renewed.summary.assumed.len() == 3 && renewed.summary.distance < 16.0);
     // Start from yesterday's calibration of the same wearer.
     let day = |number: usize| session(2, number, 30.0);
-    let yesterday = prior.update(&[day(0)], &UpdateOptions::of("w2")).unwrap().calibration;
+    let yesterday =
+        prior.update(&[day(0)], &SleeveOptions::default().of("w2")).unwrap().calibration;
     let today = session(2, 3, 60.0);
-    let options = RenewOptions { calibration: Some(yesterday.clone()), ..RenewOptions::of("w2") };
-    let renewed = prior.renew(&[without(today.clone())], &options).unwrap();
+    let options = SleeveOptions::default().of("w2");
+    let renewed = prior.renew(&[without(today.clone())], &options, Some(&yesterday)).unwrap();
     let (before, after) = (rmse(&yesterday, &today), rmse(&renewed.calibration, &today));
     assert!(after < 0.7 * before, "{after} beside {before}");
-    let refused = |trial: Trial, options: RenewOptions, says: &str| {
-        let error = prior.renew(&[without(trial)], &options).unwrap_err().to_string();
+    let refused = |trial: Trial, options: SleeveOptions, says: &str| {
+        let error = prior.renew(&[without(trial)], &options, None).unwrap_err().to_string();
         assert!(error.contains(says), "{error}");
     };
-    refused(session(9, 0, 1.0), RenewOptions::default(), "no complete movement");
-    refused(session(2, 9, 60.0), options, "999 of 1000 sessions");
+    refused(session(9, 0, 1.0), SleeveOptions::default(), "no complete movement");
+    let unseen = prior.renew(&[without(session(2, 9, 60.0))], &options, Some(&yesterday));
+    assert!(unseen.unwrap_err().to_string().contains("999 of 1000 sessions"));
     let exchanged = |mut trial: Trial| {
         let (first, second) = trial.channels.split_at_mut(1);
         std::mem::swap(&mut first[0].values, &mut second[0].values);
@@ -349,14 +352,15 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
         trial.channels[k].values.iter_mut().for_each(|x| *x = 1.0 - *x);
         trial
     };
-    let order = RenewOptions { signals: vec!["s2".into(), "s1".into()], ..RenewOptions::default() };
+    let order =
+        SleeveOptions { signals: vec!["s2".into(), "s1".into()], ..SleeveOptions::default() };
     refused(
         today.clone(),
         order,
         "s2 does not have the same position in the signals of the prior (s1,s2) as in s2,s1",
     );
     for wearer in [2, 9] {
-        let of = RenewOptions::of(&format!("w{wearer}"));
+        let of = SleeveOptions::default().of(&format!("w{wearer}"));
         let today = session(wearer, 3, 60.0);
         refused(
             exchanged(today.clone()),
@@ -376,15 +380,14 @@ fn without_a_reference_a_session_is_renewed_by_its_ends_and_what_was_not_seen_is
     }
     let fit = calibrate_array(
         &[day(0), day(1), day(2)],
-        &ArrayOptions {
+        &SleeveOptions {
             signals: vec!["s1".into(), "s2".into()],
             reference: "angle_deg".into(),
-            ..ArrayOptions::default()
+            ..SleeveOptions::default()
         },
     );
-    let foreign =
-        RenewOptions { calibration: Some(fit.unwrap().calibration), ..RenewOptions::of("w2") };
-    refused(today, foreign, "not made from this prior");
+    let foreign = prior.renew(&[without(today)], &options, Some(&fit.unwrap().calibration));
+    assert!(foreign.unwrap_err().to_string().contains("not made from this prior"));
 }
 
 #[test]
@@ -414,7 +417,7 @@ fn gauges_that_are_all_reversed_are_refused_or_a_note_says_that_it_cannot_be_tol
         today.channels.truncate(2);
         let values = today.channels.iter_mut().flat_map(|channel| &mut channel.values);
         values.for_each(|x| *x = subtracted_from.map_or(*x, |sum| sum - *x));
-        let renewed = prior.renew(&[today], &RenewOptions::default());
+        let renewed = prior.renew(&[today], &SleeveOptions::default(), None);
         let member = format!("{signals:?} subtracted from {subtracted_from:?}");
         match (renewed, says) {
             (Ok(renewed), Ok(says)) => {
@@ -443,7 +446,7 @@ fn sessions_that_cannot_share_a_prior_are_named_with_what_to_do() {
     let turned = |s: &mut Session| {
         let mut trial = session(1, 2, 90.0);
         trial.channels[0].values.iter_mut().for_each(|x| *x = 1.0 - *x);
-        let options = SessionOptions::new(["s1"], "angle_deg").of("w1");
+        let options = SleeveOptions::new(["s1"], "angle_deg").of("w1");
         *s = Session::new("w1_2", &[trial], &options).unwrap().0;
     };
     refused(&turned, "swap the wires");
@@ -455,7 +458,7 @@ fn sessions_that_cannot_share_a_prior_are_named_with_what_to_do() {
         let converted = |s: &mut Session| {
             let mut trial = session(1, 2, 90.0);
             trial.channels[2].values.iter_mut().for_each(|x| *x *= factor);
-            let options = SessionOptions::new(["s1"], "angle_deg").of("w1");
+            let options = SleeveOptions::new(["s1"], "angle_deg").of("w1");
             *s = Session::new("w1_2", &[trial], &options).unwrap().0;
         };
         refused(&converted, says);

@@ -9,7 +9,7 @@ use stretch_calibrate::{
 use stretch_data::{Trial, unit_of};
 
 use crate::{
-    SleeveCalibration, SleeveError,
+    SleeveError, SleeveFit, SleeveOptions,
     calibrate::{
         array::Still,
         bank::Bank,
@@ -26,38 +26,6 @@ use super::{
 
 /// Smallest range of a movement, as a share of the prior's range of the reference.
 pub(crate) const MOVEMENT: f64 = 0.2;
-
-/// Options of [`Prior::update`].
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct UpdateOptions {
-    /// Path of the session: sensor, wearer and so on, about which the prior may have knowledge; empty for an unknown
-    /// one.
-    pub path: Vec<String>,
-    /// Columns of the signals in the prior's order; empty for the names in the prior.
-    pub signals: Vec<String>,
-    /// Column of the reference; empty for the name in the prior.
-    pub reference: String,
-    /// Date of the calibration as free text, which is stored with it.
-    pub date: String,
-}
-
-impl UpdateOptions {
-    /// Creates options for a session with a path such as `left/anna`.
-    pub fn of(path: &str) -> Self {
-        Self { path: super::session::parse_path(path), ..Self::default() }
-    }
-}
-
-/// A calibration made from a prior and some reference.
-#[derive(Debug, Clone)]
-pub struct Updated {
-    /// The calibration.
-    pub calibration: SleeveCalibration,
-    /// Its expected errors.
-    pub summary: UpdateSummary,
-    /// Notes on missing data and on the knowledge of the path.
-    pub notes: Vec<String>,
-}
 
 /// Data of an updated calibration, and the errors of left-out sessions of the prior after as many seconds of reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -103,8 +71,8 @@ impl Prior {
     pub fn update(
         &self,
         trials: &[Trial],
-        options: &UpdateOptions,
-    ) -> Result<Updated, SleeveError> {
+        options: &SleeveOptions,
+    ) -> Result<SleeveFit<UpdateSummary>, SleeveError> {
         let signals = if options.signals.is_empty() { &self.signals } else { &options.signals };
         let reference =
             if options.reference.is_empty() { &self.reference } else { &options.reference };
@@ -138,7 +106,7 @@ impl Prior {
             still: channels.iter().fold(self.still(), |all, own| all.and(&Still::of(own))),
             ..self.linear(&posterior.mean, gram, variance)
         };
-        Ok(Updated {
+        Ok(SleeveFit {
             calibration: linear.record(channels.as_ref(), None, provenance)?,
             summary: UpdateSummary { seconds, known, expected_rmse, half_width_95 },
             notes,

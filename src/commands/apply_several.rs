@@ -5,7 +5,7 @@ use std::{
     path::Path,
 };
 
-use stretch_calibrate::Doubt;
+use stretch_calibrate::outside_range;
 use stretch_data::{Trial, push_number, unit};
 use stretch_recording::ReadOptions;
 use stretch_sleeve::{
@@ -50,7 +50,7 @@ fn report(applied: &AppliedArray) {
         samples - estimated,
         count(&|reading| reading.lost != 0)
     ));
-    Doubt::of_clamped(clamped, estimated).iter().for_each(doubt);
+    outside_range(clamped, estimated).iter().for_each(doubt);
 }
 
 /// Returns a sentence for each gauge that is left out somewhere, and for each time at which a gauge begins to deviate

@@ -4,7 +4,8 @@ use std::{fmt::Display, ops::Range, path::PathBuf};
 
 use anyhow::ensure;
 use stretch_calibrate::{
-    Doubt, Evaluation, MethodErrors, TrialErrors, evaluate, evaluation_doubts,
+    Doubt, Evaluation, MethodErrors, TrialErrors, evaluate, evaluation_doubts, fitted_trials,
+    outside_range,
 };
 use stretch_data::{Split, Trial};
 use stretch_report::{comparison_table, errors_in_words, method_table};
@@ -118,13 +119,13 @@ fn array_doubts(
     for (name, calibration) in calibrations {
         let spec = calibration.spec();
         let columns: Vec<&str> = columns_of(calibration).collect();
-        let fitted = Doubt::of_fitted(&spec.provenance, &columns, trials);
+        let fitted = fitted_trials(&spec.provenance, &columns, trials);
         all.extend(fitted.map(|doubt| doubt.of(name)));
     }
     let specs = || calibrations.iter().map(|(_, own)| own.spec());
     for (method, spec) in specs().enumerate() {
         let errors = &evaluation.pooled[method];
-        let outside = Doubt::of_clamped(errors.clamped, errors.samples);
+        let outside = outside_range(errors.clamped, errors.samples);
         let doubts = Doubt::of_method(evaluation, method, spec.all.sd, spec.reference.as_str());
         all.extend(doubts.into_iter().chain(outside).map(|doubt| doubt.of(&errors.method)));
     }

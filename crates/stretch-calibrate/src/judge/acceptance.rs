@@ -8,7 +8,7 @@ use crate::{
     prepare::{DEGREES_IN_A_RADIAN, Line, without_gross_errors},
 };
 
-use super::evaluate::MethodErrors;
+use super::{doubt::Doubt, evaluate::MethodErrors};
 
 /// A fit whose error is more than this share of the reference's standard deviation explains nothing, because the mean
 /// of the reference alone has an error that is at most about a twentieth larger. (The same margin of a twentieth
@@ -50,28 +50,30 @@ pub fn explains_little(fits: &[FitReport]) -> Option<String> {
     })
 }
 
-/// Returns a sentence for a log in which most samples lie outside the calibrated domain.
+/// Returns a doubt for a log in which most samples lie outside the calibrated domain.
 ///
 /// Most means more than half. The estimates of such a log are mostly those at the ends of the domain.
-pub(super) fn not_its_own(clamped: u64, samples: u64) -> Option<String> {
-    (2 * clamped > samples).then(|| {
+pub fn outside_range(clamped: u64, samples: u64) -> Option<Doubt> {
+    let text = (2 * clamped > samples).then(|| {
         format!(
             "{} % of the samples have a signal or a rate of change outside the range of the calibration, and were limited to it: the \
              estimates are less accurate there; calibrate on trials with this range and these speeds",
             share(clamped, samples)
         )
-    })
+    });
+    text.map(|text| Doubt::new("outside_range", text))
 }
 
-/// Returns a sentence for estimates with a larger error than the mean of the reference.
-pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<String> {
-    (errors.r_squared < 0.0).then(|| {
+/// Returns a doubt for estimates with a larger error than the mean of the reference.
+pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<Doubt> {
+    let text = (errors.r_squared < 0.0).then(|| {
         let r_squared = errors.r_squared;
         format!(
             "its error is larger than that of a constant, the mean of the reference (R^2 {r_squared:.4}): this log does \
              not belong to that calibration, or its reference is another quantity than that of the calibration"
         )
-    })
+    });
+    text.map(|text| Doubt::new("worse_than_the_mean", text))
 }
 
 /// Constant error, in percent of the range of the reference, above which it is always reported.
@@ -85,7 +87,7 @@ const SEVERAL: f64 = 5.0;
 /// still holds apart from a shift.
 const ALIKE: f64 = 1.25;
 
-/// Returns a sentence for estimates of a trial that are shifted: the mean error is more than a twentieth of the range, or
+/// Returns a doubt for estimates of a trial that are shifted: the mean error is more than a twentieth of the range, or
 /// more than a hundredth and five times the error of the fit, and either it is most of the error, or the calibration is
 /// as accurate without it as in its fit.
 ///
@@ -99,14 +101,14 @@ pub(super) fn off_throughout(
     errors: &MethodErrors,
     (fit_rmse, range): (f64, f64),
     unit: &str,
-) -> Option<String> {
+) -> Option<Doubt> {
     let MethodErrors { bias, rmse, .. } = *errors;
     let least = (0.01 * OFF_PERCENT * range).max(SEVERAL * fit_rmse);
     let is_far = bias.abs() > least.min(0.01 * FAR_OFF_PERCENT * range);
     let unshifted = (rmse * rmse - bias * bias).max(0.0).sqrt();
     let alike = ALIKE * fit_rmse;
     let is_shift = unshifted <= bias.abs() || (unshifted <= alike && alike < rmse);
-    (is_far && is_shift).then(|| {
+    let text = (is_far && is_shift).then(|| {
         let with_unit = |x: f64| format!("{} {unit}", in_digits(x, 4)).trim_end().to_owned();
         let side = if bias > 0.0 { "above" } else { "below" };
         format!(
@@ -117,21 +119,23 @@ pub(super) fn off_throughout(
             with_unit(unshifted),
             with_unit(rmse)
         )
-    })
+    });
+    text.map(|text| Doubt::new("constant_error", text))
 }
 
 /// Factors between units of a reference: decimal prefixes, and degrees in a radian.
 const FACTORS: [f64; 4] = [10.0, 100.0, 1000.0, DEGREES_IN_A_RADIAN];
 
-/// Returns a sentence for a trial whose reference runs against the estimates, or is in another unit: `line` is the line
+/// Returns a doubt for a trial whose reference runs against the estimates, or is in another unit: `line` is the line
 /// through estimates and reference, whose slope is about 1 otherwise.
-pub(super) fn other_reference(line: &Line, reference: &str) -> Option<String> {
+pub(super) fn other_reference(line: &Line, reference: &str) -> Option<Doubt> {
+    let doubt = |text| Some(Doubt::new("other_reference", text));
     if !line.is_clear() {
         return None;
     }
     let slope = line.slope();
     if slope < 0.0 {
-        return Some(format!(
+        return doubt(format!(
             "the estimate rises while {reference} falls: is {reference} (such as 180 minus the angle), or the signal, reversed? Convert \
              it with stretch convert --column '{reference}={reference}*-1+180', with its own offset"
         ));
@@ -140,7 +144,7 @@ pub(super) fn other_reference(line: &Line, reference: &str) -> Option<String> {
     let factor = factors.into_iter().find(|factor| (slope * factor - 1.0).abs() < 0.2)?;
     let is_angle = [factor, 1.0 / factor].contains(&DEGREES_IN_A_RADIAN);
     let example = if is_angle { ", such as radians and degrees" } else { "" };
-    Some(format!(
+    doubt(format!(
         "{reference} changes by {} for 1 of the estimate: are they in different units{example}? Convert it with stretch convert \
          --column '{reference}={reference}*{}'",
         in_digits(slope, 4),
@@ -148,24 +152,21 @@ pub(super) fn other_reference(line: &Line, reference: &str) -> Option<String> {
     ))
 }
 
-/// Returns a sentence if the reference is constant, because R^2 is then undefined.
-pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<String> {
-    (!errors.r_squared.is_finite()).then(|| {
+/// Returns a doubt if the reference is constant, because R^2 is then undefined.
+pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<Doubt> {
+    let text = (!errors.r_squared.is_finite()).then(|| {
         format!(
             "the reference is constant, so that R^2 is undefined, and the mean absolute error is {:.4}: is the reference connected?",
             errors.mae
         )
-    })
+    });
+    text.map(|text| Doubt::new("constant_reference", text))
 }
 
-/// Returns a sentence that lists the trials to which a calibration was fitted; `None` if there are none. A calibration
-/// holds the names of its first trials and the checksums of their samples. A trial is therefore recognised under
+/// Returns a doubt that lists the trials to which a calibration was fitted; `None` if there are none. `columns` are
+/// the signals and the reference. A calibration holds the names of its first trials and the checksums of their samples. A trial is therefore recognised under
 /// another name, and a trial that has only the name of a fitted trial is reported as such.
-pub(super) fn fitted_on(
-    provenance: &Provenance,
-    columns: &[&str],
-    trials: &[Trial],
-) -> Option<String> {
+pub fn fitted_trials(provenance: &Provenance, columns: &[&str], trials: &[Trial]) -> Option<Doubt> {
     let is_known = |trial: &Trial| {
         let checksum = trial.checksum(columns);
         checksum.is_some_and(|sum| provenance.checksums().contains(&sum))
@@ -190,12 +191,13 @@ pub(super) fn fitted_on(
         Some(format!("{}{how}", trial.name))
     });
     let fitted: Vec<String> = fitted.collect();
-    (!fitted.is_empty()).then(|| {
+    let text = (!fitted.is_empty()).then(|| {
         format!(
             "it was fitted on {}, so that these numbers do not show how good it is on other trials; evaluate trials that were not used for the fit",
             fitted.join(", ")
         )
-    })
+    });
+    text.map(|text| Doubt::new("fitted_trials", text))
 }
 
 /// Returns a share in percent. It is 100 only if `part` equals `of`.

@@ -3,13 +3,13 @@
 use std::fmt;
 
 use serde::Serialize;
-use stretch_core::{Calibration, Provenance, Range};
+use stretch_core::{Calibration, Range};
 use stretch_data::{Trial, out_of_order, rate_of};
 use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::{
     acceptance::{
-        beside_a_constant, fitted_on, not_its_own, off_throughout, other_reference,
+        beside_a_constant, fitted_trials, off_throughout, other_reference, outside_range,
         worse_than_the_mean,
     },
     apply::{Applied, at_rate},
@@ -38,16 +38,6 @@ impl Doubt {
         matches!(self.code, "other_unit" | "constant_signal")
     }
 
-    /// Returns a doubt about a log if most of its samples were clamped to the calibrated range.
-    pub fn of_clamped(clamped: u64, samples: u64) -> Option<Self> {
-        not_its_own(clamped, samples).map(|text| Self::new("outside_range", text))
-    }
-
-    /// Returns a doubt about errors on trials that were used for the fit. `columns` are the signals and the reference.
-    pub fn of_fitted(provenance: &Provenance, columns: &[&str], trials: &[Trial]) -> Option<Self> {
-        fitted_on(provenance, columns, trials).map(|text| Self::new("fitted_trials", text))
-    }
-
     /// Returns doubts about a method of an evaluation, by its place in it: trials whose reference is in another unit or
     /// reversed, trials whose estimates are shifted, and errors that say nothing. Doubts about a trial name it if there
     /// are several. `fit_rmse` is the RMSE of the method's fit, in the unit of the reference, and `reference` the name of
@@ -66,22 +56,18 @@ impl Doubt {
             let pairs =
                 trial.estimates[method].iter().copied().zip(trial.reference.iter().copied());
             let line = Line::through(pairs.filter(|(estimate, _)| estimate.is_finite()));
-            let found = other_reference(&line, reference).map(|text| ("other_reference", text));
             let shift = || off_throughout(&trial.methods[method], (fit_rmse, range), unit);
-            let found = found.or_else(|| shift().map(|text| ("constant_error", text)));
-            let Some((code, text)) = found else { continue };
-            match all.iter_mut().find(|doubt| doubt.code == code) {
+            let Some(found) = other_reference(&line, reference).or_else(shift) else { continue };
+            match all.iter_mut().find(|doubt| doubt.code == found.code) {
                 Some(first) => first.text = format!("{}; also {}", first.text, trial.trial),
-                None if trials.len() == 1 => all.push(Self::new(code, text)),
-                None => all.push(Self::new(code, text).of(&trial.trial)),
+                None if trials.len() == 1 => all.push(found),
+                None => all.push(found.of(&trial.trial)),
             }
         }
         if !all.iter().any(|doubt| doubt.code == "other_reference") {
-            all.extend(
-                worse_than_the_mean(pooled).map(|text| Self::new("worse_than_the_mean", text)),
-            );
+            all.extend(worse_than_the_mean(pooled));
         }
-        all.extend(beside_a_constant(pooled).map(|text| Self::new("constant_reference", text)));
+        all.extend(beside_a_constant(pooled));
         all
     }
 
@@ -177,7 +163,7 @@ pub(super) fn is_outside(range: &Range<f64>, signal: f64, reading: &Reading) -> 
 }
 
 fn outside(reach: &Reach, clamped: u64, samples: u64) -> Option<Doubt> {
-    reach.doubt().or_else(|| Doubt::of_clamped(clamped, samples))
+    reach.doubt().or_else(|| outside_range(clamped, samples))
 }
 
 impl Applied {
@@ -216,7 +202,7 @@ pub fn evaluation_doubts(
         });
         let spec = calibration.spec();
         let columns = [spec.signal.as_str(), spec.reference.as_str()];
-        let fitted = Doubt::of_fitted(&spec.provenance, &columns, trials);
+        let fitted = fitted_trials(&spec.provenance, &columns, trials);
         all.extend(paces.chain(fitted).map(|doubt| doubt.of(name)));
     }
     // The first method is the raw signal.

@@ -11,7 +11,7 @@ mod model_choice;
 mod model_words;
 mod reach;
 
-pub use acceptance::{explains_little, explains_nothing};
+pub use acceptance::{explains_little, explains_nothing, fitted_trials, outside_range};
 pub use apply::{
     Applied, Faults, LiveReceptor, MOST_MISSING, apply, at_rate, cadence, on_own_ranges,
     pressure_column,

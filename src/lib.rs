@@ -46,7 +46,7 @@ struct Cli {
     /// Also print what is read and chosen
     ///
     /// With times, on standard error. For a diagnosis, print all details and the answers of simpler methods.
-    #[arg(short, long, global = true, display_order = 901)]
+    #[arg(short, long, alias = "baselines", global = true, display_order = 901)]
     verbose: bool,
     #[command(subcommand)]
     command: Command,

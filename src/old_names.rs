@@ -1,6 +1,6 @@
 //! Commands and options of earlier releases and their replacements.
 
-use std::ffi::OsString;
+use std::ffi::{OsStr, OsString};
 
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
@@ -33,7 +33,7 @@ const COMMANDS: [(&str, &str); 9] = [
 ];
 
 /// Removed options, each with a sentence on the replacement.
-const OPTIONS: [(&str, &str); 19] = [
+const OPTIONS: [(&str, &str); 21] = [
     ("--adc-bits", "write --adc BITS,ZERO,FULL_SCALE"),
     ("--adc-zero-v", "write --adc BITS,ZERO,FULL_SCALE"),
     ("--adc-full-scale-v", "write --adc BITS,ZERO,FULL_SCALE"),
@@ -51,75 +51,42 @@ const OPTIONS: [(&str, &str); 19] = [
     ("--fixed", "write stretch export --calibration cal.json --fixed FILE"),
     ("--grid", "resample first: stretch convert LOG --grid HZ --out TRIAL.csv"),
     ("--jobs", "write jobs = N below [simulator] in the problem's file"),
+    ("--kinds", "write stretch effects kinds"),
     ("--normalise", "channels are always divided by their range"),
     ("--paper", "write stretch calibrate --rate paper, or stretch demo --paper"),
     ("--rate-source", "--rate paper selects the complete published method"),
     ("--sessions", "write --data FOLDER/GROUP"),
     ("--threads", "set RAYON_NUM_THREADS=N in the environment; the result is the same"),
+    ("--time-unit", "write --time COL:UNIT, such as --time stamp:us"),
 ];
 
-/// Renamed options and their new names, so that old scripts still work. The value of the option
-/// replaces the braces. A new name without braces takes no value.
-const RENAMED: [(&str, &str); 7] = [
-    ("--baselines", "--verbose"),
-    ("--json-out", "--json={}"),
-    ("--kinds", "kinds"),
-    ("--preset", "--rig={}"),
-    ("--sample-rate", "--time={}hz"),
-    ("--signals", "--signal={}"),
-    ("--time-unit", "--time=:{}"),
+/// Renamed options and their new names, so that old scripts still work. The value of the option stands between the two
+/// texts.
+const RENAMED: [(&str, [&str; 2]); 4] = [
+    ("--json-out", ["--json=", ""]),
+    ("--preset", ["--rig=", ""]),
+    ("--sample-rate", ["--time=", "hz"]),
+    ("--signals", ["--signal=", ""]),
 ];
 
 /// Replaces renamed options by their present names.
-pub(crate) fn with_todays_names(arguments: impl Iterator<Item = OsString>) -> Vec<OsString> {
-    let mut arguments = arguments.peekable();
+pub(crate) fn with_todays_names(mut arguments: impl Iterator<Item = OsString>) -> Vec<OsString> {
     let mut renamed = Vec::new();
     while let Some(argument) = arguments.next() {
-        if argument == "--" {
-            renamed.push(argument);
+        let text = argument.to_string_lossy().into_owned();
+        let (name, value) = text.split_once('=').map_or((&*text, None), |(n, v)| (n, Some(v)));
+        if let Some((_, [before, after])) = RENAMED.iter().find(|(old, _)| *old == name) {
+            let value = value.map(OsString::from).or_else(|| arguments.next()).unwrap_or_default();
+            renamed.push([OsStr::new(before), &*value, OsStr::new(after)].into_iter().collect());
+            continue;
+        }
+        renamed.push(argument);
+        if text == "--" {
             break;
         }
-        let text = argument.to_string_lossy();
-        let (name, value) = text.split_once('=').map_or((&*text, None), |(n, v)| (n, Some(v)));
-        let Some((_, new)) = RENAMED.iter().find(|(old, _)| *old == name) else {
-            renamed.push(argument);
-            continue;
-        };
-        let Some((before, after)) = new.split_once("{}") else {
-            renamed.push(new.into());
-            continue;
-        };
-        let value = value.map(OsString::from).or_else(|| arguments.next()).unwrap_or_default();
-        let mut spelled = OsString::from(before);
-        spelled.push(value);
-        spelled.push(after);
-        renamed.push(spelled);
     }
     renamed.extend(arguments);
-    with_unit_behind_column(renamed)
-}
-
-/// Moves a time unit, given as a separate option, to the end of the option that names the time
-/// column.
-fn with_unit_behind_column(mut arguments: Vec<OsString>) -> Vec<OsString> {
-    let find =
-        |prefix: &str| arguments.iter().position(|a| a.to_string_lossy().starts_with(prefix));
-    let (Some(unit), Some(column)) = (
-        find("--time=:"),
-        arguments.iter().position(|a| {
-            let text = a.to_string_lossy();
-            text == "--time" || (text.starts_with("--time=") && !text.starts_with("--time=:"))
-        }),
-    ) else {
-        return arguments;
-    };
-    let text = arguments.remove(unit).to_string_lossy().replace("--time=", "");
-    let column = column - usize::from(unit < column);
-    let value = if arguments[column] == "--time" { column + 1 } else { column };
-    if let Some(value) = arguments.get_mut(value) {
-        value.push(text);
-    }
-    arguments
+    renamed
 }
 
 /// Returns a sentence on the replacement of a removed command or option, if the error is about one.
@@ -171,17 +138,12 @@ mod tests {
             let words: Vec<String> = words.map(|word| word.into_string().unwrap()).collect();
             words.join(" ")
         };
-        assert_eq!(new("stretch diagnose --baselines rig"), "stretch diagnose --verbose rig");
         assert_eq!(new("stretch apply --sample-rate=50 a.csv"), "stretch apply --time=50hz a.csv");
         assert_eq!(new("stretch apply --sample-rate 5 a"), "stretch apply --time=5hz a");
-        assert_eq!(new("stretch effects --kinds"), "stretch effects kinds");
         let several = "stretch calibrate --signals s1,s2 a.csv";
         assert_eq!(new(several), "stretch calibrate --signal=s1,s2 a.csv");
         let asked = "stretch diagnose rig --json-out d.json --quiet";
         assert_eq!(new(asked), "stretch diagnose rig --json=d.json --quiet");
-        let unit = "stretch convert a.csv --time-unit us --time stamp --out b.csv";
-        assert_eq!(new(unit), "stretch convert a.csv --time stamp:us --out b.csv");
-        assert_eq!(new("stretch convert a.csv --time-unit ms"), "stretch convert a.csv --time=:ms");
         assert_eq!(new("stretch simulate --preset paper"), "stretch simulate --rig=paper");
         assert_eq!(new("stretch apply -- --sample-rate 5"), "stretch apply -- --sample-rate 5");
     }

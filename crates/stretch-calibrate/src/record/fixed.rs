@@ -194,18 +194,7 @@ fn too_coarse(calibration: &Calibration) -> CalibrateError {
 /// Returns the RMSE of a calibration's fit in the unit of its reference, but at least a thousandth of the range,
 /// because a fit can be exact.
 pub fn fit_error(calibration: &Calibration) -> f64 {
-    let spec = calibration.spec();
-    let rmse = match &spec.model {
-        Model::Linear(line) => line.fit.rmse,
-        Model::Surfaces { inflation, deflation } | Model::Blended { inflation, deflation } => {
-            inflation.fit.rmse.max(deflation.fit.rmse)
-        }
-        Model::History(map) => map.fit.rmse,
-        Model::Observer(map) => map.fit.rmse,
-        Model::Diagnosed(map) => map.fit.rmse,
-        _ => 0.0,
-    };
-    rmse.max(1e-3) * span(calibration)
+    calibration.spec().model.fit_rmse().max(1e-3) * span(calibration)
 }
 
 /// Returns the range of the target in the unit of the reference.

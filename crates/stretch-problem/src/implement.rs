@@ -1,10 +1,8 @@
 //! The effects that a diagnosis names, as code to type into a simulator.
 
 use stretch_data::in_digits;
-use stretch_gap::{Diagnosis, EffectSpec, EffectValue, Evidence};
-use stretch_sim::{Effect, Language, Sketch, Surroundings};
-
-use crate::fix::Chosen;
+use stretch_gap::EffectValue;
+use stretch_sim::{Language, Sketch};
 
 /// A named effect with the numbers that were fitted: its equation, its initial state, and its code.
 #[derive(Debug, Clone)]
@@ -49,31 +47,6 @@ impl Implementation {
         let sketch = self.sketch.as_ref()?;
         Some(sketch.code(language, &Language::identifier(&self.name), &comments))
     }
-}
-
-/// The effects of the built-in catalogue that a diagnosis names; `complete` adds the values that
-/// are estimated from the recording.
-pub(crate) fn implementations(
-    (diagnosis, evidence): (&Diagnosis, &Evidence),
-    catalogue: &[EffectSpec],
-    rows: &[&'static Effect],
-    around: &Surroundings<'_>,
-    complete: impl Fn(&Effect, Vec<f64>) -> Vec<f64>,
-) -> Vec<Implementation> {
-    let Ok(chosen) = Chosen::of(diagnosis, evidence) else { return Vec::new() };
-    let one = |(index, values): (usize, &[f64])| {
-        let effect = rows[index];
-        let values = complete(effect, values.to_vec());
-        Implementation {
-            name: effect.name.to_owned(),
-            words: effect.words.to_owned(),
-            stage: effect.stage.name().to_owned(),
-            formula: effect.equation.to_owned(),
-            numbers: chosen.numbers(effect.name),
-            sketch: effect.sketch(&values, around),
-        }
-    };
-    chosen.named(catalogue).into_iter().map(one).collect()
 }
 
 /// A number with its unit and its 95 % interval.

@@ -36,7 +36,7 @@ pub use implement::Implementation;
 pub use init::first_problem;
 pub use predict::{PAUSE_S, PredictedOutput, PredictedTrial, Prediction, predict, predict_with};
 pub use problem::{Diagnosable, Problem, Reading, name_of};
-pub use rig::{RigSession, RigSetup, RigSimulator, RigTrial};
+pub use rig::{RigSession, RigSetup, RigSimulator};
 pub use sensors::sensors;
 pub use stretch_data::EffectEntry;
 pub use stretch_effects::{KINDS, Kind, Language, Side, kind_named};

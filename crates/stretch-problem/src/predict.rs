@@ -259,7 +259,7 @@ fn score(
     outputs: &[Vec<Vec<f64>>; 2],
 ) -> PredictedOutput {
     let (spec, noise) = (&problem.description().stages[stage], problem.noise[stage]);
-    let measured = problem.columns.of(&spec.channel).map_or(&[][..], |all| &all[samples.clone()]);
+    let measured = problem.columns.all(&spec.channel).get(samples.clone()).unwrap_or(&[]);
     let [with, without] = outputs.each_ref().map(|all| all[stage][samples.clone()].to_vec());
     let [rmse, rmse_without] = [&with, &without].map(|predicted| {
         let squares = measured.iter().zip(predicted).map(|(m, p)| (m - p) * (m - p));
@@ -283,7 +283,7 @@ fn score(
 /// Inputs, outputs and their rates that leave the range of the fitted recordings, in sentences.
 fn extrapolated(problem: &Checked, samples: &Range<usize>) -> Vec<String> {
     let (columns, dt_s) = (&problem.columns, problem.session().dt_s);
-    let (trials, fitted) = (columns.ranges(), columns.looked_at());
+    let (trials, fitted) = (&columns.ranges, columns.looked_at());
     let sentence = |name: String, values: &[f64]| {
         let (low, high) = ends(fitted.iter().flat_map(|range| &values[range.clone()]));
         let margin = MARGIN * (high - low);
@@ -299,8 +299,8 @@ fn extrapolated(problem: &Checked, samples: &Range<usize>) -> Vec<String> {
     names.sort_unstable();
     names.dedup();
     let of = |name: &String| {
-        let values = columns.of(name).unwrap_or(&[]);
-        let rates = of_position(values, &trials, dt_s);
+        let values = columns.all(name);
+        let rates = of_position(values, trials, dt_s);
         [sentence(name.clone(), values), sentence(format!("the rate of {name}"), &rates)]
     };
     names.into_iter().flat_map(of).flatten().collect()

@@ -8,6 +8,7 @@ use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::Tolerance;
 
 use crate::{
+    bench::straight_line,
     black_box::{
         Ask, BlackBox, Checked, Input, Parameter, ProblemSpec, RecordedSession, StageEntry, closure,
     },
@@ -16,15 +17,6 @@ use crate::{
 
 /// Tolerance of offset and gain, in ranges of the signal, so that both are practically free.
 const FREE: f64 = 3.0;
-
-/// A nominal sensor: y = offset + gain e, where e is the reference as a share of its range.
-#[derive(Debug, Clone, Copy)]
-struct Line {
-    offset: f64,
-    gain: f64,
-    /// Range of the signal.
-    size: f64,
-}
 
 /// Builds a problem from several sensors that one recorder recorded together with one reference. The model of each
 /// sensor is y = offset + gain e, where e is the reference as a share of its range. All kinds of effects are looked for
@@ -49,7 +41,6 @@ pub fn sensors(
     let references = of(reference);
     let (low, high) = ends(references.iter().flat_map(|x| x.iter()));
     let span = if high > low { high - low } else { 1.0 };
-    let lines: Vec<Line> = signals.iter().map(|s| line(&references, &of(s), (low, span))).collect();
     let noise = noise_variance(references.iter().copied(), dt_s).sqrt();
     let stage = |signal: &&str| StageEntry {
         name: (*signal).to_owned(),
@@ -57,15 +48,25 @@ pub fn sensors(
         inputs: vec![reference.to_owned()],
         ..StageEntry::default()
     };
-    let parameters = signals.iter().zip(&lines).flat_map(|(signal, line)| {
+    // The nominal sensor is the straight line of its signal over e.
+    let parameters = signals.iter().flat_map(|signal| {
+        let trials = of(signal);
+        let pairs = || {
+            let pairs = references.iter().zip(&trials).flat_map(|(x, y)| x.iter().zip(*y));
+            let known = pairs.filter(|(x, y)| x.is_finite() && y.is_finite());
+            known.map(|(x, y)| ((x - low) / span, *y))
+        };
+        let (offset, gain) = straight_line(pairs, 1.0);
+        let (least, greatest) = ends(trials.iter().copied().flatten());
+        let size = (greatest - least).max(f64::MIN_POSITIVE);
         let one = |name: &str, value: f64| Parameter {
             name: format!("{name}_{signal}"),
             value,
-            tolerance: Tolerance::Absolute(FREE * line.size),
+            tolerance: Tolerance::Absolute(FREE * size),
             stages: vec![(*signal).to_owned()],
             ..Parameter::default()
         };
-        [one("offset", line.offset), one("gain", line.gain)]
+        [one("offset", offset), one("gain", gain)]
     });
     let checked = Checked::new(ProblemSpec {
         stages: signals.iter().map(stage).collect(),
@@ -90,22 +91,6 @@ pub fn sensors(
 /// The column that drives every stage.
 fn reference_of(session: &RecordedSession) -> &str {
     session.stages.first().and_then(|s| s.inputs.first()).map_or("", String::as_str)
-}
-
-/// Offset and gain of the straight line that gives a signal from the reference.
-fn line(references: &[&[f64]], signals: &[&[f64]], (low, span): (f64, f64)) -> Line {
-    let pairs = || {
-        let trials = references.iter().zip(signals);
-        let pairs = trials.flat_map(|(x, y)| x.iter().zip(*y));
-        pairs.filter(|(x, y)| x.is_finite() && y.is_finite()).map(|(x, y)| ((x - low) / span, *y))
-    };
-    let (n, e, y) = pairs().fold((0.0, 0.0, 0.0), |(n, a, b), (e, y)| (n + 1.0, a + e, b + y));
-    let (e, y) = (e / f64::max(n, 1.0), y / f64::max(n, 1.0));
-    let (ee, ey) = pairs()
-        .fold((0.0, 0.0), |(ee, ey), (x, z)| (ee + (x - e) * (x - e), ey + (x - e) * (z - y)));
-    let gain = if ee > 0.0 && ey != 0.0 { ey / ee } else { 1.0 };
-    let (least, greatest) = ends(signals.iter().flat_map(|y| y.iter()));
-    Line { offset: y - gain * e, gain, size: (greatest - least).max(f64::MIN_POSITIVE) }
 }
 
 /// Reads several sensors from a trial or the folder of a data set; `signals` are separated by

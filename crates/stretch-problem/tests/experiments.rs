@@ -41,7 +41,7 @@ fn what_motion_cannot_part_other_experiments_do() {
     let d = |all: &[(String, f64)], name: &str| all.iter().find(|x| x.0 == name).unwrap().1;
     // A slack sleeve stops at a strain, an amplifier at a voltage: another excitation moves only one of them.
     let bridge = stretch_sim::Bridge::new(rig.nominal());
-    let (shortest_mm, _) = stretch_data::ends(rig.session().trials()[0].length_mm());
+    let (shortest_mm, _) = stretch_data::ends(rig.measured(0));
     let strain = bridge.strain(shortest_mm + 6.0);
     let top = bridge.volts(bridge.resistance(strain));
     let all = of(&rig, ("sleeve_slack", strain), ("amplifier_saturation", top));

@@ -144,7 +144,7 @@ fn shortening() -> Vec<Shortening> {
     };
     let rig = |trials: &[SessionTrial]| {
         let session = RigSession::new(trials)?;
-        let samples = session.trials().iter().map(|t| t.length_mm().len()).collect();
+        let samples = session.trials().iter().map(|t| t.samples).collect();
         Ok((samples, session.notes().to_vec()))
     };
     let black_box = |outputs: usize| {

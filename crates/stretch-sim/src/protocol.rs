@@ -54,7 +54,15 @@ const SET_LENGTH: &str = "set_length_mm";
 const SHUNT: &str = "shunt_share";
 
 impl TrialPlan {
-    fn new(file: String, kind: TrialKind, seconds: f64) -> Self {
+    /// Plans a trial at [`RATE_HZ`] that begins vented, with both valves shut for `seconds`.
+    ///
+    /// ```
+    /// use stretch_data::TrialKind;
+    /// use stretch_sim::TrialPlan;
+    /// let rest = TrialPlan::new("rest.csv".into(), TrialKind::Other, 2.0);
+    /// assert_eq!((rest.inlet, rest.outlet), (vec![0.0; 200], vec![0.0; 200]));
+    /// ```
+    pub fn new(file: String, kind: TrialKind, seconds: f64) -> Self {
         let samples = (seconds * RATE_HZ) as usize;
         Self {
             file,
@@ -235,7 +243,7 @@ impl TrialPlan {
     }
 
     /// Inputs other than the valve openings, as columns of a trial. A replay reads these columns.
-    pub(crate) fn more_columns(&self) -> Vec<Channel> {
+    pub fn more_columns(&self) -> Vec<Channel> {
         let column =
             |name: &str, values: &[f64]| Channel { name: name.to_owned(), values: values.to_vec() };
         let excited = vec![self.excitation; self.inlet.len()];

@@ -1,11 +1,120 @@
-//! Parts that a whole rig and a gauge alone share: reading and cleaning of recordings, and effects
-//! of the catalogue.
+//! Parts that a whole rig and a gauge alone share: recordings on one grid, smoothed inputs, effects of the catalogue, and
+//! the results of a diagnosis.
 
-pub(crate) mod acting;
+mod acting;
+mod built_in;
+pub(crate) mod columns;
 pub(crate) mod courses;
 pub(crate) mod isolated_outliers;
 pub(crate) mod rig_file;
 pub(crate) mod shortened;
-pub(crate) mod specs;
-pub(crate) mod trials;
-pub(crate) mod undetermined;
+pub(crate) mod smooth;
+mod specs;
+mod undetermined;
+
+use stretch_gap::{Description, DescriptionSpec, Line, Model, ParameterSpec, StageSpec};
+use stretch_sim::{Effect, EffectSet, Measured, SimError};
+
+use crate::error::ProblemError;
+pub(crate) use acting::Acting;
+use acting::all;
+pub(crate) use built_in::BuiltIn;
+use columns::Columns;
+use specs::shown;
+pub(crate) use specs::{Place, skew_of};
+
+/// A simulator of the catalogue's effects with its recording.
+#[derive(Debug, Clone)]
+pub(crate) struct Bench {
+    pub(crate) about: Description,
+    pub(crate) columns: Columns,
+    /// Effects that the simulator already has.
+    pub(crate) effects: EffectSet,
+    /// The effects that are looked for, in the order of the description.
+    pub(crate) rows: Vec<&'static Effect>,
+    /// The stage of the sensor.
+    pub(crate) sensor: usize,
+    /// Noise of the sensor's signal, one standard deviation.
+    pub(crate) noise: f64,
+    /// Size of the unit of the sensor's effects, in the unit of its signal.
+    pub(crate) unit: f64,
+}
+
+impl Bench {
+    /// Describes a simulator whose last stage is the sensor. Of the `candidates`, the simulator lacks the effects that it
+    /// does not have and that the recording can show.
+    pub(crate) fn new(
+        (stages, parameters): (Vec<StageSpec>, Vec<ParameterSpec>),
+        mut columns: Columns,
+        effects: EffectSet,
+        candidates: impl Iterator<Item = (&'static Effect, Place)>,
+        (noise, unit): (f64, f64),
+    ) -> Result<Self, ProblemError> {
+        let missing = candidates.filter(|(effect, _)| effects.find(effect.name).is_none());
+        let (rows, specs) = shown(missing, columns.dt_s, &mut columns.notes);
+        let sensor = stages.len() - 1;
+        let (trials, dt_s) = (columns.trials.clone(), columns.dt_s);
+        let about = DescriptionSpec { stages, parameters, effects: specs, trials, dt_s };
+        let about = Description::new(about)?;
+        Ok(Self { about, columns, effects, rows, sensor, noise, unit })
+    }
+
+    /// The measured output of a stage, all trials end to end.
+    pub(crate) fn measured(&self, stage: usize) -> &[f64] {
+        self.columns.all(&self.about.stages[stage].channel)
+    }
+
+    /// The samples of the sensor's signal in one trial from which effects may be estimated.
+    pub(crate) fn record(&self, trial: usize) -> Measured<'_> {
+        let range = self.columns.fitted().nth(trial).unwrap_or_default();
+        let samples = &self.measured(self.sensor)[range];
+        Measured { samples, noise: self.noise, unit: self.unit, dt_s: self.columns.dt_s }
+    }
+
+    /// The effects of a model and of the simulator, divided by what becomes of them.
+    pub(crate) fn acting<'a>(&'a self, model: &'a Model) -> Result<Acting<'a>, SimError> {
+        Acting::of(all(&self.effects, &self.rows, model))
+    }
+
+    /// The spectral lines that the effects of the simulator and of a model add to the sensor's signal in the test
+    /// samples.
+    pub(crate) fn lines(&self, model: &Model) -> Vec<Line> {
+        all(&self.effects, &self.rows, model)
+            .filter_map(|(effect, values)| effect.line(values))
+            .map(|line| Line { hertz: line.hertz, amplitude: self.unit * line.amplitude })
+            .collect()
+    }
+
+    /// The effects of a simulator and of a model without a recording: typical values replace those that would be
+    /// estimated from a recording.
+    pub(crate) fn unrecorded(&self, model: &Model) -> Result<EffectSet, SimError> {
+        let mut effects = self.effects.clone();
+        for (index, values) in &model.effects {
+            effects.push(self.rows[*index], &self.rows[*index].with_stand_ins(values))?;
+        }
+        Ok(effects)
+    }
+}
+
+/// Checks that every sample of a simulated stage is finite.
+pub(crate) fn finite(stage: &str, samples: &[f64]) -> Result<(), ProblemError> {
+    match samples.iter().all(|x| x.is_finite()) {
+        true => Ok(()),
+        false => Err(ProblemError::NotFinite { stage: stage.to_owned() }),
+    }
+}
+
+/// Offset and slope of the straight line of y over x by least squares, from pairs (x, y). The slope is `flat` if x or y
+/// never changes.
+pub(crate) fn straight_line<I: Iterator<Item = (f64, f64)>>(
+    pairs: impl Fn() -> I,
+    flat: f64,
+) -> (f64, f64) {
+    let (n, x, y) = pairs().fold((0.0_f64, 0.0, 0.0), |(n, a, b), (x, y)| (n + 1.0, a + x, b + y));
+    let (mean_x, mean_y) = (x / n.max(1.0), y / n.max(1.0));
+    let (xx, xy) = pairs().fold((0.0, 0.0), |(xx, xy), (x, y)| {
+        (xx + (x - mean_x) * (x - mean_x), xy + (x - mean_x) * (y - mean_y))
+    });
+    let slope = if xx > 0.0 && xy != 0.0 { xy / xx } else { flat };
+    (mean_y - slope * mean_x, slope)
+}

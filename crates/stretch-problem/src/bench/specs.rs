@@ -13,7 +13,7 @@ pub(crate) struct Place {
 }
 
 /// Converts an effect that acts at a place.
-pub(crate) fn spec(effect: &Effect, place: Place) -> EffectSpec {
+fn spec(effect: &Effect, place: Place) -> EffectSpec {
     let Place { touches, search, unit } = place;
     let parameter = |(p, range): (&EffectParameter, &[f64; 2])| {
         let unit = unit(p);
@@ -44,18 +44,18 @@ pub(crate) fn skew_of(about: &Description, usual: [f64; 2]) -> [f64; 2] {
     skew.and_then(|e| e.parameters.first()).map_or(usual, |p| [p.min, p.max])
 }
 
-/// Effects that a recording of this sample time can show, each with its place; a note for each
-/// other effect says why it is left out.
-pub(crate) fn shown(
+/// Effects that a recording of this sample time can show, and their entries for the diagnosis; a note for each other
+/// effect says why it is left out.
+pub(super) fn shown(
     effects: impl Iterator<Item = (&'static Effect, Place)>,
     dt_s: f64,
     notes: &mut Vec<String>,
-) -> (Vec<&'static Effect>, Vec<Place>) {
+) -> (Vec<&'static Effect>, Vec<EffectSpec>) {
     let rate_hz = 1.0 / dt_s;
     effects
         .filter_map(|(effect, mut place)| {
             let Some(needed) = place.search.at_rate(|values| effect.least_rate_hz(values), rate_hz) else {
-                return Some((effect, place));
+                return Some((effect, spec(effect, place)));
             };
             notes.push(format!(
                 "{} is not looked for, because at {rate_hz:.4} samples a second it cannot be distinguished from motion and drift; \

@@ -11,14 +11,13 @@ use stretch_sim::Tolerance;
 use super::{
     begins::{Before, Begins, begins},
     catalogue::{Acting, Around, behind_outputs, own_effects},
-    columns::Columns,
     facts::facts,
     source::{RecordedSession, SessionColumn, SessionPart, SessionStage},
     spec::{Input, OwnEffect, Parameter, ProblemSpec, StageEntry},
     velocity::{integral_of, of_position},
 };
 use crate::{
-    bench::shortened::shortened,
+    bench::{columns::Columns, shortened::shortened},
     error::ProblemError,
     wrap::{Among, Placed, Site},
 };
@@ -219,7 +218,7 @@ impl Checked {
     }
 
     pub(crate) fn stage_inputs(&self, stage: usize) -> impl Iterator<Item = &[f64]> {
-        self.stages[stage].inputs.iter().map(|c| self.columns.of(c).unwrap_or(&[]))
+        self.stages[stage].inputs.iter().map(|c| self.columns.all(c))
     }
 }
 
@@ -232,9 +231,8 @@ fn input_noise(stage: &StageEntry, inputs: &[Input]) -> Vec<f64> {
 /// Noise of the output of a stage: as stated, or estimated while its inputs rest, or from second
 /// differences of the recordings.
 fn noise(stage: &StageEntry, columns: &Columns) -> Noise {
-    let of = |name: &String| columns.of(name).unwrap_or(&[]);
-    let (values, looked) = (of(&stage.output), columns.looked_at());
-    let inputs: Vec<&[f64]> = stage.inputs.iter().map(of).collect();
+    let (values, looked) = (columns.all(&stage.output), columns.looked_at());
+    let inputs: Vec<&[f64]> = stage.inputs.iter().map(|name| columns.all(name)).collect();
     let parts = looked.iter().map(|r| &values[r.clone()]);
     let stated = stage.noise.map(Noise::known);
     stated
@@ -244,10 +242,9 @@ fn noise(stage: &StageEntry, columns: &Columns) -> Noise {
 
 /// The beginnings of the trials of a stage.
 fn begins_of(stage: &StageEntry, noise: &Noise, columns: &Columns) -> Begins {
-    let of = |name: &String| columns.of(name).unwrap_or(&[]);
-    let inputs: Vec<&[f64]> = stage.inputs.iter().map(of).collect();
-    let parts = (columns.ranges(), columns.looked_at());
-    begins((&inputs, of(&stage.output)), (&parts.0, &parts.1), noise.sd())
+    let inputs: Vec<&[f64]> = stage.inputs.iter().map(|name| columns.all(name)).collect();
+    let output = columns.all(&stage.output);
+    begins((&inputs, output), (&columns.ranges, &columns.looked_at()), noise.sd())
 }
 
 /// A note on trials that begin with a step from an unknown command.
@@ -267,7 +264,7 @@ fn begins_note(begun: &[Begins], wrappers: &[Placed]) -> Option<String> {
 fn parts(columns: &Columns) -> Vec<(Range<usize>, f64)> {
     let begun_s = columns.trials.first().map_or(0.0, |t| t.start_s);
     let starts = columns.trials.iter().map(|t| t.start_s - begun_s);
-    columns.ranges().into_iter().zip(starts).collect()
+    columns.ranges.iter().cloned().zip(starts).collect()
 }
 
 /// Names of the columns that are used, each once.
@@ -303,7 +300,7 @@ fn sensor_of(
 fn velocity(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
     let recorded = stage.velocity.as_ref().and_then(|c| columns.of(c));
     let position = || stage.position.as_ref().and_then(|c| columns.of(c));
-    let differences = |x: &[f64]| of_position(x, &columns.ranges(), columns.dt_s);
+    let differences = |x: &[f64]| of_position(x, &columns.ranges, columns.dt_s);
     recorded.map(<[f64]>::to_vec).or_else(|| position().map(differences))
 }
 
@@ -312,7 +309,7 @@ fn velocity(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
 fn position(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
     let recorded = stage.position.as_ref().and_then(|c| columns.of(c));
     let velocity = || stage.velocity.as_ref().and_then(|c| columns.of(c));
-    let integral = |v: &[f64]| integral_of(v, &columns.ranges(), columns.dt_s);
+    let integral = |v: &[f64]| integral_of(v, &columns.ranges, columns.dt_s);
     recorded.map(<[f64]>::to_vec).or_else(|| velocity().map(integral))
 }
 
@@ -411,7 +408,7 @@ fn session(
     columns: &Columns,
     unit_of: &impl Fn(&str) -> String,
 ) -> RecordedSession {
-    let ranges = columns.ranges();
+    let ranges = columns.ranges.clone();
     let part = |(trial, samples): (&stretch_gap::TrialSpec, Range<usize>)| SessionPart {
         name: trial.name.clone(),
         samples,
@@ -493,7 +490,7 @@ fn check_stated(
             let hint = "give the unit of the column, or leave the unit out";
             return Err(ProblemError::value(owner(), found, hint));
         }
-        let (least, greatest) = ends(columns.of(column).unwrap_or(&[]));
+        let (least, greatest) = ends(columns.all(column));
         if let Some(noise) = noise.filter(|noise| *noise > 0.0 && *noise >= greatest - least) {
             let span = greatest - least;
             let found = format!("a noise of {noise} hides all of {column}, which spans {span}");

@@ -63,14 +63,14 @@ impl BlackBox {
     /// The external inputs: inputs that are not the output of any stage.
     fn driven(&self) -> Vec<Driven> {
         let session = self.problem.session();
-        let (looked, trials) = (self.problem.columns.looked_at(), self.problem.columns.ranges());
+        let (looked, trials) = (self.problem.columns.looked_at(), &self.problem.columns.ranges);
         let is_output = |name: &str| session.stages.iter().any(|s| s.output == name);
         let mut out: Vec<Driven> = Vec::new();
         for name in session.stages.iter().flat_map(|s| &s.inputs) {
             if is_output(name) || out.iter().any(|d| d.name == *name) {
                 continue;
             }
-            let column = self.problem.columns.of(name).unwrap_or(&[]);
+            let column = self.problem.columns.all(name);
             let all = |of: &[f64]| -> Vec<f64> {
                 looked.iter().flat_map(|r| &of[r.clone()]).copied().collect()
             };
@@ -79,7 +79,7 @@ impl BlackBox {
             let range = ends(&values);
             let middle = values.len() / 2;
             let median = *values.select_nth_unstable_by(middle, f64::total_cmp).1;
-            let rates = all(&of_position(column, &trials, session.dt_s));
+            let rates = all(&of_position(column, trials, session.dt_s));
             let fastest = rates.iter().fold(0.0, |a: f64, rate| a.max(rate.abs()));
             out.push(Driven { name: name.clone(), range, median, first, fastest });
         }
@@ -204,7 +204,7 @@ impl Laboratory for BlackBox {
     fn done(&self) -> Course {
         let samples = self.problem.session().samples(1);
         let measured = |d: Driven| {
-            let column = self.problem.columns.of(&d.name).unwrap_or(&[]);
+            let column = self.problem.columns.all(&d.name);
             (d.name, column[..samples].to_vec())
         };
         Course(self.driven().into_iter().map(measured).collect())

@@ -2,9 +2,10 @@
 
 use std::borrow::Cow;
 
-use stretch_gap::{Column, Description, MotionSpec, RecordFacts, Recorded, RowsUsed};
+use stretch_gap::{Column, Description, MotionSpec, RecordFacts, Recorded};
 
-use super::{columns::Columns, source::RecordedSession};
+use super::source::RecordedSession;
+use crate::bench::columns::Columns;
 
 /// Range of the delays that skews of the catalogue represent, s.
 const SKEW_S: [f64; 2] = [-0.2, 0.2];
@@ -17,12 +18,11 @@ pub(super) fn facts(
     sensor: Option<&(usize, String)>,
 ) -> RecordFacts {
     let motion = sensor.and_then(|(_, name)| session.columns.iter().find(|c| c.name == *name));
-    let rows = columns.rows;
     RecordFacts {
         is_lost: columns.is_lost.clone(),
         motion: motion.map(|c| MotionSpec::new(c.values.clone(), &c.unit)),
         sensor: sensor.map(|(stage, _)| *stage),
-        rows_used: Some(RowsUsed { used: rows.used(), read: rows.read }),
+        rows_used: Some(columns.rows_used()),
         signals: signals(session),
         columns: record_columns(about, session),
         ..RecordFacts::default()

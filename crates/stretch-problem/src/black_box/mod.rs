@@ -3,7 +3,6 @@
 pub(crate) mod begins;
 mod catalogue;
 pub(crate) mod checked;
-pub(crate) mod columns;
 mod coupled;
 mod experiments;
 mod facts;
@@ -255,7 +254,7 @@ impl Simulator for BlackBox {
     }
 
     fn measured(&self, stage: usize) -> &[f64] {
-        self.problem.columns.of(&self.problem.stages[stage].output).unwrap_or(&[])
+        self.problem.columns.all(&self.problem.stages[stage].output)
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {

@@ -1,15 +1,15 @@
 //! Candidate experiments on a gauge alone, and the signal that a model predicts for each.
 
 use stretch_data::{Channel, Trial};
-use stretch_gap::{GapError, Laboratory, Model, Plan, TrialSpec};
+use stretch_gap::{GapError, Laboratory, Model, Plan};
 use stretch_sim::{Gauge, RigStage, Start};
 
-use super::GaugeSimulator;
+use super::{
+    GaugeSimulator,
+    session::{REFERENCE, pressure},
+};
 use crate::{
-    bench::{
-        acting::unrecorded,
-        courses::{Points, begin, course, loops, moving, paced},
-    },
+    bench::courses::{Points, begin, course, loops, moving, paced},
     black_box::velocity::of_position,
     error::ProblemError,
 };
@@ -17,20 +17,14 @@ use crate::{
 /// Greatest length of an experiment if the first trial is not longer, s.
 const LONGEST_S: f64 = 120.0;
 
-/// An experiment on a gauge: the time course of e, which is the reference as a share of its range.
+/// An experiment on a gauge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Course {
-    e: Vec<f64>,
+    reference: Vec<f64>,
     /// Whether blocks of known length (gauge blocks) replace the reference.
     is_known: bool,
-    /// Applied pressure as a share of its range; 0 if none is applied.
+    /// Applied pressure; 0 if none is applied.
     pressure: Vec<f64>,
-}
-
-/// The gauge held in the middle while the pressure goes up and down.
-fn held_under_pressure(dt_s: f64) -> Course {
-    let pressure: Vec<f64> = course(&begin(&[loops(0.0, 1.0, 4.0, 4)]), dt_s).collect();
-    Course { e: vec![0.5; pressure.len()], is_known: true, pressure }
 }
 
 /// Experiments in which the gauge is held at known lengths with blocks, or left alone. Each has a name, instructions,
@@ -58,75 +52,57 @@ fn still() -> [(&'static str, &'static str, f64, Points, bool); 2] {
 impl GaugeSimulator {
     /// The signal over a course, in units of its noise.
     fn prediction(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, ProblemError> {
-        let (mut model, mut base) = (model.clone(), self.nominal.effects.clone());
+        let mut effects = self.bench.unrecorded(model)?;
         if course.is_known {
-            model.effects.retain(|(i, _)| self.rows[*i].stage != RigStage::Reference);
-            let shown =
-                self.nominal.effects.iter().filter(|e| e.effect().stage == RigStage::Reference);
-            shown.for_each(|known| drop(base.remove(known.name())));
+            effects = effects.only(|effect| effect.stage != RigStage::Reference);
         }
-        let effects = unrecorded(&base, &self.rows, &model)?;
-        let gauge = Gauge::new(self.nominal(&model), &effects, self.session.dt_s)?;
-        let shown = self.reference_of(course);
-        let mut signal = vec![0.0; shown.len()];
+        let gauge = Gauge::new(self.tuned(model), &effects, self.bench.about.dt_s)?;
+        let mut signal = vec![0.0; course.reference.len()];
         // Without a pressure column there is no effect of pressure either.
-        let pressure = match self.session.pressure.is_empty() {
-            true => Vec::new(),
-            false => self.pressure_of(course),
+        let pressure: &[f64] = match pressure(&self.bench.columns) {
+            [] => &[],
+            _ => &course.pressure,
         };
-        gauge.run(&mut gauge.memory(), Start::Settled, 0.0, &shown, &pressure, &mut signal)?;
-        let noise = self.noise.max(1e-6 * self.spread);
+        let (mut memory, start) = (gauge.memory(), Start::Settled);
+        gauge.run(&mut memory, start, 0.0, &course.reference, pressure, &mut signal)?;
+        let noise = self.bench.noise.max(1e-6 * self.bench.unit);
         signal.iter_mut().for_each(|y| *y /= noise);
         Ok(vec![signal])
     }
 
     /// Greatest rate of the recorded reference, outside the test trials.
     fn fastest(&self) -> f64 {
-        let session = &self.session;
-        let ranges = TrialSpec::ranges(&session.trials);
-        let rates = of_position(&session.reference, &ranges, session.dt_s);
-        let rates = session.fitted().flat_map(|range| &rates[range]);
+        let columns = &self.bench.columns;
+        let rates = of_position(&columns.values[REFERENCE], &columns.ranges, columns.dt_s);
+        let rates = columns.fitted().flat_map(|range| &rates[range]);
         rates.fold(0.0, |a: f64, rate| a.max(rate.abs()))
     }
 
-    /// A course without pressure, in which the reference moves no faster than `fastest`; `is_known` states whether
-    /// blocks of known length replace the reference.
-    fn held(&self, points: &[(f64, f64)], is_known: bool, fastest: f64) -> Course {
-        let dt_s = self.session.dt_s;
-        let points = paced(points, self.nominal.spec.span.abs() / fastest);
-        let most = self.inputs[0].values.len().max((LONGEST_S / dt_s) as usize);
-        let e: Vec<f64> = course(&points, dt_s).take(most).collect();
-        Course { pressure: vec![0.0; e.len()], e, is_known }
-    }
-
-    fn reference_of(&self, course: &Course) -> Vec<f64> {
-        course.e.iter().map(|e| self.nominal.spec.zero + self.nominal.spec.span * e).collect()
-    }
-
-    fn pressure_of(&self, course: &Course) -> Vec<f64> {
-        let scale = self.nominal.spec.pressure_scale.unwrap_or(0.0);
-        course.pressure.iter().map(|share| share * scale).collect()
-    }
-
-    /// The trial that prescribes a course: the reference, and the pressure if one is applied.
-    fn trial(&self, name: &str, course: &Course) -> Trial {
-        let channel = |name: String, values| Channel { name, values };
-        let reference = format!("set_{}", self.reference);
-        let mut channels = vec![channel(reference, self.reference_of(course))];
-        if course.pressure.iter().any(|share| *share != 0.0) {
-            channels.push(channel("set_pressure_kpa".into(), self.pressure_of(course)));
-        }
-        let time_s = (0..course.e.len()).map(|i| i as f64 * self.session.dt_s).collect();
-        Trial { name: name.into(), time_s, channels }
-    }
-
-    fn experiment(
+    /// A course from the reference and the pressure, each as shares of its range.
+    fn course(
         &self,
-        (name, how): (&str, &str),
-        prepare_min: f64,
-        course: Course,
-    ) -> (Plan, Course) {
-        let trial = self.trial(name, &course);
+        e: impl Iterator<Item = f64>,
+        pressure: Option<Vec<f64>>,
+        is_known: bool,
+    ) -> Course {
+        let spec = &self.spec;
+        let reference: Vec<f64> = e.map(|e| spec.zero + spec.span * e).collect();
+        let mut pressure = pressure.unwrap_or_else(|| vec![0.0; reference.len()]);
+        pressure.iter_mut().for_each(|share| *share *= spec.pressure_scale.unwrap_or(0.0));
+        Course { reference, is_known, pressure }
+    }
+
+    /// The plan of a course: a trial that prescribes the reference, and the pressure if one is applied.
+    fn plan(&self, (name, how): (&str, &str), prepare_min: f64, course: Course) -> (Plan, Course) {
+        let channel = |name: String, values: &[f64]| Channel { name, values: values.to_vec() };
+        let reference = format!("set_{}", self.bench.columns.names[REFERENCE]);
+        let mut channels = vec![channel(reference, &course.reference)];
+        if course.pressure.iter().any(|pressure| *pressure != 0.0) {
+            channels.push(channel("set_pressure_kpa".into(), &course.pressure));
+        }
+        let dt_s = self.bench.about.dt_s;
+        let time_s = (0..course.reference.len()).map(|i| i as f64 * dt_s).collect();
+        let trial = Trial { name: name.into(), time_s, channels };
         (Plan { name: name.into(), how: how.into(), prepare_min, trial }, course)
     }
 }
@@ -135,29 +111,34 @@ impl Laboratory for GaugeSimulator {
     type Setting = Course;
 
     fn experiments(&self) -> Vec<(Plan, Course)> {
-        let (dt_s, fastest) = (self.session.dt_s, self.fastest());
+        let dt_s = self.bench.about.dt_s;
+        // The reference moves no faster than it was recorded.
+        let least_s = self.spec.span.abs() / self.fastest();
+        let most = self.bench.about.trials[0].samples.max((LONGEST_S / dt_s) as usize);
         let moving =
             moving().into_iter().map(|(name, how, points)| (name, how, 0.25, points, false));
         let all = moving.chain(still()).map(|(name, how, prepare_min, points, is_known)| {
-            self.experiment((name, how), prepare_min, self.held(&points, is_known, fastest))
+            let points = paced(&points, least_s);
+            let e = course(&points, dt_s).take(most);
+            self.plan((name, how), prepare_min, self.course(e, None, is_known))
         });
         let mut candidates: Vec<(Plan, Course)> = all.collect();
-        if !self.session.pressure.is_empty() {
+        if !pressure(&self.bench.columns).is_empty() {
             let how =
                 "Hold the gauge at one length, with a block, while the pressure goes up and down.";
-            let named = ("held_under_pressure", how);
-            candidates.push(self.experiment(named, 3.0, held_under_pressure(dt_s)));
+            let pressure: Vec<f64> = course(&begin(&[loops(0.0, 1.0, 4.0, 4)]), dt_s).collect();
+            let held = std::iter::repeat_n(0.5, pressure.len());
+            let held = self.course(held, Some(pressure), true);
+            candidates.push(self.plan(("held_under_pressure", how), 3.0, held));
         }
         candidates
     }
 
     /// The first minute of the recording, as a course.
     fn done(&self) -> Course {
-        let samples = ((60.0 / self.session.dt_s) as usize).min(self.inputs[0].values.len());
-        let values = &self.inputs[0].values[..samples];
-        let e: Vec<f64> =
-            values.iter().map(|x| (x - self.nominal.spec.zero) / self.nominal.spec.span).collect();
-        Course { pressure: vec![0.0; e.len()], e, is_known: false }
+        let mut reference = self.input.trial(0, None);
+        reference.truncate((60.0 / self.bench.about.dt_s) as usize);
+        Course { pressure: vec![0.0; reference.len()], reference, is_known: false }
     }
 
     fn predict(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, GapError> {

@@ -6,28 +6,26 @@ mod fixed;
 mod session;
 mod source;
 
-use std::ops::Range;
-
-use stretch_data::SessionTrial;
+use stretch_data::{SessionTrial, unit_of};
 use stretch_gap::{
-    Description, DescriptionSpec, GapError, Line, Model, Noise, ParameterSpec, Run, Simulator,
-    StageSpec, TrialSpec,
+    Description, GapError, Line, Model, Noise, ParameterSpec, Run, Simulator, StageSpec,
 };
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
 };
 
-use facts::{facts, unit_of};
-use session::GaugeSession;
+use facts::facts;
+use session::{REFERENCE, SIGNAL, noise, pressure};
 
 use crate::{
     bench::{
-        acting::{Acting, FitRecord, lines},
-        specs::{Place, shown, spec as spec_of},
-        trials::session_s,
+        Bench, Place,
+        columns::Columns,
+        finite,
+        smooth::{MeasuredInput, Smoothed, unscheduled},
+        straight_line,
     },
     error::ProblemError,
-    rig::smooth::{Draws, Smoothed, unscheduled},
 };
 
 /// Index of the offset among the parameters.
@@ -93,24 +91,13 @@ pub struct GaugeSetup<'a> {
 /// ```
 #[derive(Debug)]
 pub struct GaugeSimulator {
-    about: Description,
-    /// The gauge as shipped, with the effects that the gauge already has.
-    nominal: GaugeRig,
-    rows: Vec<&'static Effect>,
-    session: GaugeSession,
-    /// The smoothed reference of each trial, which drives the gauge.
-    inputs: Vec<Smoothed>,
-    draws: Draws,
-    /// Column of the reference.
-    reference: String,
-    reference_noise: Noise,
-    /// Noise of the signal, one standard deviation.
-    noise: f64,
-    /// Range of the signal.
-    spread: f64,
-    /// The measured signal from which effects may be estimated.
-    found_in: FitRecord,
-    notes: Vec<String>,
+    bench: Bench,
+    /// The gauge as shipped.
+    spec: GaugeSpec,
+    /// Tolerances of offset and gain.
+    tolerances: [Tolerance; 2],
+    /// The smoothed reference, which drives the gauge.
+    input: MeasuredInput,
 }
 
 impl GaugeSimulator {
@@ -121,103 +108,76 @@ impl GaugeSimulator {
     /// Columns that are missing, dead, hold too few numbers or look swapped.
     pub fn new(setup: &GaugeSetup<'_>) -> Result<Self, ProblemError> {
         let GaugeSetup { trials, reference, signal, rig, catalogue } = *setup;
-        let session = GaugeSession::read(trials, reference, signal)?;
-        let nominal = nominal(&session, rig);
-        let (least, greatest) = session.range(&session.signal);
-        let (reference_noise, noise) =
-            (session.noise(&session.reference), session.noise(&session.signal).sd());
-        let smooth = |range: Range<usize>| {
-            let allowed = unscheduled(range.len());
-            Smoothed::of(&session.reference[range], reference_noise.sd(), &allowed)
+        let columns = session::read(trials, reference, signal)?;
+        let is_evidence = rig.is_some();
+        let rig = nominal(&columns, rig);
+        let [x, y] = [REFERENCE, SIGNAL].map(|column| &columns.values[column]);
+        let (least, greatest) = columns.range(y);
+        let [x_noise, y_noise] = [x, y].map(|values| noise(&columns, values));
+        let input = smoothed(&columns, x, x_noise);
+        let alone = alone(&columns);
+        let has_pressure = rig.spec.pressure_scale.is_some();
+        let place = |effect: &'static Effect| {
+            let (touches, search) = (vec![0], Gauge::search(effect, &alone));
+            (effect, Place { touches, search, unit: Gauge::unit })
         };
-        let inputs: Vec<Smoothed> =
-            TrialSpec::ranges(&session.trials).into_iter().map(smooth).collect();
-        let alone = alone(&session);
-        let has_pressure = nominal.spec.pressure_scale.is_some();
-        let is_missing = |e: &&Effect| nominal.effects.find(e.name).is_none();
-        let place = |effect: &Effect| Place {
-            touches: vec![0],
-            search: Gauge::search(effect, &alone),
-            unit: Gauge::unit,
-        };
-        let missing = catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure) && is_missing(e));
-        let mut notes = session.notes.clone();
-        let (rows, places) = shown(missing.map(|e| (e, place(e))), session.dt_s, &mut notes);
-        let effects =
-            rows.iter().zip(places).map(|(effect, place)| spec_of(effect, place)).collect();
-        let stage =
-            StageSpec::new("sensing", signal, unit_of(signal), &[OFFSET, GAIN, INITIAL_STATE]);
-        let parameters = parameters(&nominal, signal, rig.is_some());
-        let (trials, dt_s) = (session.trials.clone(), session.dt_s);
-        let about = DescriptionSpec { stages: vec![stage], parameters, effects, trials, dt_s };
-        let about = Description::new(about)?;
-        let known = facts(&about, reference, &session, &inputs);
-        Ok(Self {
-            about: about.with_record(known)?,
-            rows,
-            inputs,
-            reference: reference.into(),
-            draws: Draws::new(),
-            reference_noise,
-            noise,
-            spread: greatest - least,
-            found_in: FitRecord::of(&session.trials, &session.signal, dt_s),
-            notes,
-            session,
-            nominal,
-        })
+        let stages = vec![StageSpec::new(
+            "sensing",
+            signal,
+            &unit_of(signal),
+            &[OFFSET, GAIN, INITIAL_STATE],
+        )];
+        let parameters = parameters(&rig, signal, is_evidence);
+        let candidates = catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure)).map(place);
+        let sensor = (y_noise.sd(), greatest - least);
+        let GaugeRig { spec, offset, gain, effects } = rig;
+        let mut bench = Bench::new((stages, parameters), columns, effects, candidates, sensor)?;
+        let known = facts(&bench, input.values());
+        bench.about = bench.about.with_record(known)?;
+        Ok(Self { bench, spec, tolerances: [offset, gain], input })
     }
 
     /// Notes from reading the recordings, in sentences.
     pub fn notes(&self) -> &[String] {
-        &self.notes
+        &self.bench.columns.notes
     }
 
-    fn nominal(&self, model: &Model) -> GaugeSpec {
-        GaugeSpec {
-            offset: model.parameters[OFFSET],
-            gain: model.parameters[GAIN],
-            ..self.nominal.spec
-        }
+    /// The gauge with the offset and the gain of a model.
+    fn tuned(&self, model: &Model) -> GaugeSpec {
+        let [offset, gain] = [OFFSET, GAIN].map(|index| model.parameters[index]);
+        GaugeSpec { offset, gain, ..self.spec }
     }
 
     /// The signal over the trials of a run.
     fn signal(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), ProblemError> {
-        let acting = Acting::of(&self.nominal.effects, &self.rows, run.model)?;
-        let gauge = Gauge::new(self.nominal(run.model), &acting.inside, self.about.dt_s)?;
+        let Columns { trials, ranges, dt_s, .. } = &self.bench.columns;
+        let acting = self.bench.acting(run.model)?;
+        let gauge = Gauge::new(self.tuned(run.model), &acting.inside, *dt_s)?;
+        let pressure = pressure(&self.bench.columns);
         let mut memory = gauge.memory();
         // The motion of the gauge before the session is unknown.
         let mut start = Start::Hysteresis(run.model.parameters[INITIAL_STATE]);
-        let mut from = 0;
-        for (i, trial) in self.session.trials[..run.trials].iter().enumerate() {
-            let to = from + trial.samples;
-            let input = match run.input_noise {
-                None => self.inputs[i].values.clone(),
-                Some(seed) => self.draws.with_noise(&self.inputs, &self.reference_noise, seed, i),
-            };
-            let pressure = self.session.pressure.get(from..to).unwrap_or(&[]);
-            gauge.run(&mut memory, start, trial.start_s, &input, pressure, &mut out[from..to])?;
-            let record = self.found_in.of_trial(i, self.noise, self.spread);
-            acting.follow(record, &mut out[from..to]);
-            let next = self.session.trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
-            let rest_s = (next - trial.start_s - trial.samples as f64 * self.about.dt_s).max(0.0);
+        for (i, trial) in trials[..run.trials].iter().enumerate() {
+            let own = &mut out[ranges[i].clone()];
+            let input = self.input.trial(i, run.input_noise);
+            let pressure = pressure.get(ranges[i].clone()).unwrap_or(&[]);
+            gauge.run(&mut memory, start, trial.start_s, &input, pressure, own)?;
+            acting.follow(self.bench.record(i), own);
+            let next = trials.get(i + 1).map_or(f64::INFINITY, |t| t.start_s);
+            let rest_s = (next - trial.start_s - trial.samples as f64 * dt_s).max(0.0);
             start = Start::Carried { rest_s };
-            from = to;
         }
-        match out.iter().all(|x| x.is_finite()) {
-            true => Ok(()),
-            false => Err(ProblemError::NotFinite { stage: "sensing".into() }),
-        }
+        finite("sensing", out)
     }
 }
 
 impl Simulator for GaugeSimulator {
     fn description(&self) -> &Description {
-        &self.about
+        &self.bench.about
     }
 
-    fn measured(&self, _stage: usize) -> &[f64] {
-        &self.session.signal
+    fn measured(&self, stage: usize) -> &[f64] {
+        self.bench.measured(stage)
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
@@ -225,16 +185,25 @@ impl Simulator for GaugeSimulator {
     }
 
     fn lines(&self, _stage: usize, model: &Model) -> Vec<Line> {
-        lines(&self.nominal.effects, &self.rows, model, self.spread)
+        self.bench.lines(model)
     }
+}
+
+/// The reference, smoothed as far as its noise allows.
+fn smoothed(columns: &Columns, reference: &[f64], noise: Noise) -> MeasuredInput {
+    let smooth = |range: &std::ops::Range<usize>| {
+        Smoothed::of(&reference[range.clone()], noise.sd(), &unscheduled(range.len()))
+    };
+    MeasuredInput::new(columns.ranges.iter().map(smooth).collect(), noise)
 }
 
 /// The gauge of a rig file. Without a rig file it is a gauge that is estimated from the recording, with offset and gain
 /// free.
-fn nominal(session: &GaugeSession, rig: Option<&GaugeRig>) -> GaugeRig {
-    let (low, high) = session.range(&session.reference);
-    let (least, greatest) = session.range(&session.signal);
-    let scale = (!session.pressure.is_empty()).then(|| session.range(&session.pressure).1);
+fn nominal(columns: &Columns, rig: Option<&GaugeRig>) -> GaugeRig {
+    let [(low, high), (least, greatest)] =
+        [REFERENCE, SIGNAL].map(|column| columns.range(&columns.values[column]));
+    let pressure = pressure(columns);
+    let scale = (!pressure.is_empty()).then(|| columns.range(pressure).1);
     let pressure_scale = scale.filter(|scale| *scale > 0.0);
     if let Some(rig) = rig {
         let mut rig = rig.clone();
@@ -243,7 +212,7 @@ fn nominal(session: &GaugeSession, rig: Option<&GaugeRig>) -> GaugeRig {
     }
     let mut spec =
         GaugeSpec { zero: low, span: high - low, offset: 0.0, gain: 1.0, pressure_scale };
-    (spec.offset, spec.gain) = line(session, &spec);
+    (spec.offset, spec.gain) = line(columns, &spec);
     let free = Tolerance::Absolute(3.0 * (greatest - least));
     GaugeRig { spec, offset: free, gain: free, effects: EffectSet::new() }
 }
@@ -251,7 +220,7 @@ fn nominal(session: &GaugeSession, rig: Option<&GaugeRig>) -> GaugeRig {
 fn parameters(rig: &GaugeRig, signal: &str, is_evidence: bool) -> Vec<ParameterSpec> {
     let parameter = |name: &str, nominal: f64, tolerance: Tolerance| ParameterSpec {
         is_evidence,
-        ..ParameterSpec::new(name, unit_of(signal), nominal).within(tolerance.sd(nominal))
+        ..ParameterSpec::new(name, &unit_of(signal), nominal).within(tolerance.sd(nominal))
     };
     vec![
         parameter("offset", rig.spec.offset, rig.offset),
@@ -263,28 +232,19 @@ fn parameters(rig: &GaugeRig, signal: &str, is_evidence: bool) -> Vec<ParameterS
     ]
 }
 
-fn alone(session: &GaugeSession) -> Alone {
-    let longest = session.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
-    Alone {
-        session_s: session_s(&session.trials, session.dt_s),
-        lag_s: lag_s(&session.reference[longest.clone()], &session.signal[longest], session.dt_s),
-    }
+fn alone(columns: &Columns) -> Alone {
+    let longest = columns.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
+    let [x, y] = [REFERENCE, SIGNAL].map(|column| &columns.values[column][longest.clone()]);
+    Alone { session_s: columns.session_s(), lag_s: lag_s(x, y, columns.dt_s) }
 }
 
 /// Offset and gain of the straight line of the signal over e, in the trials that are fitted.
-fn line(session: &GaugeSession, spec: &GaugeSpec) -> (f64, f64) {
-    let pairs = || {
-        session.fitted().flat_map(|r| {
-            let e = session.reference[r.clone()].iter().map(|x| (x - spec.zero) / spec.span);
-            e.zip(&session.signal[r])
-        })
-    };
-    let (n, e, y) = pairs().fold((0.0, 0.0, 0.0), |(n, a, b), (e, y)| (n + 1.0, a + e, b + y));
-    let (e, y) = (e / n, y / n);
-    let (ee, ey) = pairs()
-        .fold((0.0, 0.0), |(ee, ey), (x, z)| (ee + (x - e) * (x - e), ey + (x - e) * (z - y)));
-    let gain = if ee > 0.0 && ey != 0.0 { ey / ee } else { 1.0 };
-    (y - gain * e, gain)
+fn line(columns: &Columns, spec: &GaugeSpec) -> (f64, f64) {
+    let [x, y] = [REFERENCE, SIGNAL].map(|column| &columns.values[column]);
+    let e = |x: &f64| (x - spec.zero) / spec.span;
+    let pairs =
+        || columns.fitted().flat_map(|r| x[r.clone()].iter().map(e).zip(y[r].iter().copied()));
+    straight_line(pairs, 1.0)
 }
 
 /// Longest lag that is looked for, s.

@@ -69,19 +69,19 @@ pub(super) fn causes(
 
 /// The last few results of a function, by its arguments. A clone begins empty, because the owner of a clone will change what the function depends on.
 #[derive(Debug)]
-pub(super) struct LastResults<K: Hash + Eq, V> {
+pub(crate) struct LastResults<K: Hash + Eq, V> {
     last: Mutex<LruCache<K, Arc<V>>>,
     most: NonZeroUsize,
 }
 
 impl<K: Hash + Eq, V> LastResults<K, V> {
     /// A cache of at most `most` results.
-    pub(super) fn new(most: NonZeroUsize) -> Self {
+    pub(crate) fn new(most: NonZeroUsize) -> Self {
         Self { last: Mutex::new(LruCache::new(most)), most }
     }
 
     /// The result for a key, made if it is not kept. Two threads that miss a result both make it, and get the same.
-    pub(super) fn or_make<E>(
+    pub(crate) fn or_make<E>(
         &self,
         key: K,
         make: impl FnOnce() -> Result<V, E>,

@@ -1,126 +1,76 @@
 //! Candidate experiments on the rig, and the channels that a model predicts for each.
 
-use stretch_data::{Channel, Trial};
+use stretch_data::{Channel, Trial, TrialKind};
 use stretch_gap::{GapError, Laboratory, Model, Plan};
 use stretch_sim::{
-    Chain, DEFAULT_STEP_S, Grid, Key, Openings, Recorded, Reference, RigStage, Sensing, Start,
-    TrialPlan,
+    Chain, DEFAULT_STEP_S, Grid, Key, Openings, RATE_HZ, Recorded, Reference, RigStage, Sensing,
+    Start, TrialPlan,
 };
 
-use super::{RigSimulator, nominal::TunedRig};
-use crate::{bench::acting::unrecorded, error::ProblemError};
+use super::{RigSimulator, nominal::TunedRig, session::VALVES};
+use crate::error::ProblemError;
 
 /// Sample time of an experiment, s.
-const DT_S: f64 = 0.01;
+const DT_S: f64 = 1.0 / RATE_HZ;
 /// Step of integration, s: four times the usual one, because differences between alternatives need few digits.
 const STEP_S: f64 = 4.0 * DEFAULT_STEP_S;
 /// Share by which the shunt changes the bridge's trim.
 const SHUNT: f64 = 0.02;
 
-/// How an experiment drives the rig.
-#[derive(Debug, Clone, PartialEq)]
-enum Drive {
-    /// Valves drive the rig.
-    Valves {
-        /// Whether the chamber begins full.
-        full: bool,
-    },
-    /// Length and pressure are set from outside.
-    Held {
-        /// Length, mm.
-        length_mm: Vec<f64>,
-        /// Pressure, kPa.
-        pressure_kpa: Vec<f64>,
-        /// Share by which a shunt lowers the bridge's trim, by sample; empty without a shunt.
-        shunt: Vec<f64>,
-    },
-}
-
 /// An experiment on the rig.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Experiment {
-    /// Name in the list of candidates.
-    name: &'static str,
     /// Instructions, in a sentence.
     how: &'static str,
     /// Time to prepare the experiment, minutes.
     prepare_min: f64,
-    inlet: Vec<f64>,
-    outlet: Vec<f64>,
-    drive: Drive,
-    /// Excitation as a share of the usual one.
-    excitation: f64,
+    /// Commands, and the length if it is set from outside; the name is that of the candidate.
+    plan: TrialPlan,
+    /// Pressure at a length that is set from outside, kPa.
+    pressure_kpa: Vec<f64>,
 }
 
 impl Experiment {
     fn plan(&self) -> Plan {
-        let (name, how, trial) = (self.name.to_owned(), self.how.to_owned(), self.trial());
+        let TrialPlan { file, inlet, outlet, .. } = &self.plan;
+        let valves = VALVES.into_iter().zip([inlet, outlet]);
+        let valves =
+            valves.map(|(name, values)| Channel { name: name.into(), values: values.clone() });
+        let trial = Trial {
+            name: file.clone(),
+            time_s: (0..inlet.len()).map(|i| i as f64 / RATE_HZ).collect(),
+            channels: valves.chain(self.plan.more_columns()).collect(),
+        };
+        let (name, how) = (file.clone(), self.how.to_owned());
         Plan { name, how, prepare_min: self.prepare_min, trial }
     }
 
-    /// The trial of the experiment: openings, and channels that are set from outside.
-    fn trial(&self) -> Trial {
-        let samples = self.inlet.len();
-        let channel =
-            |name: &str, values: &[f64]| Channel { name: name.into(), values: values.to_vec() };
-        let mut channels = vec![channel("inlet", &self.inlet), channel("outlet", &self.outlet)];
-        if let Drive::Held { length_mm, shunt, .. } = &self.drive {
-            channels.push(channel("set_length_mm", length_mm));
-            if !shunt.is_empty() {
-                channels.push(channel("shunt_share", shunt));
-            }
-        }
-        if self.excitation != 1.0 {
-            channels.push(channel("excitation_share", &vec![self.excitation; samples]));
-        }
-        Trial {
-            name: self.name.into(),
-            time_s: (0..samples).map(|i| (i as f64 * DT_S * 100.0).round() / 100.0).collect(),
-            channels,
-        }
-    }
-
-    fn of(plan: TrialPlan, name: &'static str, how: &'static str, prepare_min: f64) -> Self {
-        Self {
-            name,
-            how,
-            prepare_min,
-            inlet: plan.inlet,
-            outlet: plan.outlet,
-            drive: Drive::Valves { full: plan.full },
-            excitation: 1.0,
-        }
+    fn of(plan: TrialPlan, name: &str, how: &'static str, prepare_min: f64) -> Self {
+        let plan = TrialPlan { file: name.to_owned(), ..plan };
+        Self { how, prepare_min, plan, pressure_kpa: Vec::new() }
     }
 
     /// An experiment of pieces of (inlet, outlet, seconds), after a second of rest.
-    fn pieces(name: &'static str, how: &'static str, pieces: &[(f64, f64, f64)]) -> Self {
-        let (mut inlet, mut outlet) = (vec![0.0; 100], vec![0.0; 100]);
-        for &(i, o, s) in pieces {
+    fn pieces(name: &str, how: &'static str, pieces: &[(f64, f64, f64)]) -> Self {
+        let mut plan = TrialPlan::new(name.to_owned(), TrialKind::Other, 1.0);
+        for &(inlet, outlet, s) in pieces {
             let samples = (s / DT_S).round() as usize;
-            inlet.extend(std::iter::repeat_n(i, samples));
-            outlet.extend(std::iter::repeat_n(o, samples));
+            plan.inlet.extend(std::iter::repeat_n(inlet, samples));
+            plan.outlet.extend(std::iter::repeat_n(outlet, samples));
         }
-        let drive = Drive::Valves { full: false };
-        Self { name, how, prepare_min: 0.25, inlet, outlet, drive, excitation: 1.0 }
+        Self { how, prepare_min: 0.25, plan, pressure_kpa: Vec::new() }
     }
 
-    fn held(
-        name: &'static str,
-        how: &'static str,
-        prepare_min: f64,
-        length_mm: Vec<f64>,
-        pressure_kpa: Vec<f64>,
-    ) -> Self {
+    /// An experiment at lengths (mm) that are set from outside, without pressure.
+    fn held(name: &str, how: &'static str, prepare_min: f64, length_mm: Vec<f64>) -> Self {
         let samples = length_mm.len();
-        Self {
-            name,
-            how,
-            prepare_min,
+        let plan = TrialPlan {
             inlet: vec![0.0; samples],
             outlet: vec![0.0; samples],
-            drive: Drive::Held { length_mm, pressure_kpa, shunt: Vec::new() },
-            excitation: 1.0,
-        }
+            set_length_mm: Some(length_mm),
+            ..TrialPlan::new(name.to_owned(), TrialKind::Other, 0.0)
+        };
+        Self { how, prepare_min, plan, pressure_kpa: vec![0.0; samples] }
     }
 
     /// The candidates for a rig whose length goes from `stroke.0` to `stroke.1` mm and whose supply is at `supply_kpa`.
@@ -167,9 +117,10 @@ impl Experiment {
             "Clamp the crossbeam at half its stroke and sweep the pressure.",
             2.0,
             vec![at(0.5); sweep.len()],
-            sweep,
         );
-        for (i, (inlet, outlet)) in clamped.inlet.iter_mut().zip(&mut clamped.outlet).enumerate() {
+        clamped.pressure_kpa = sweep;
+        let TrialPlan { inlet, outlet, .. } = &mut clamped.plan;
+        for (i, (inlet, outlet)) in inlet.iter_mut().zip(outlet).enumerate() {
             let fills = (i / seconds(5.0)).is_multiple_of(2);
             *if fills { inlet } else { outlet } = 0.1;
         }
@@ -184,28 +135,22 @@ impl Experiment {
             "gauge_blocks",
             "Set three lengths with gauge blocks, which replace the potentiometer as the reference.",
             3.0,
-            blocks.clone(),
-            vec![0.0; blocks.len()],
+            blocks,
         );
         let mut shunt = Self::held(
             "shunt_step",
             "At rest, switch a shunt across the bridge on and off: only electrical effects respond.",
             1.0,
             vec![at(1.0); seconds(8.0)],
-            vec![0.0; seconds(8.0)],
         );
-        if let Drive::Held { length_mm, shunt, .. } = &mut shunt.drive {
-            // The shunt is off, on, and off again.
-            *shunt = vec![0.0; length_mm.len()];
-            let part = length_mm.len() / 4;
-            shunt[part..3 * part].fill(SHUNT);
-        }
+        // The shunt is off, on, and off again.
+        let share = |i: usize| if (seconds(2.0)..seconds(6.0)).contains(&i) { SHUNT } else { 0.0 };
+        shunt.plan.shunt = Some((0..seconds(8.0)).map(share).collect());
         let rest = Self::held(
             "rest",
             "Leave the rig alone for two minutes with the bridge powered: what changes does not come from motion.",
             0.0,
             vec![at(1.0); seconds(120.0)],
-            vec![0.0; seconds(120.0)],
         );
         let mut low = Self::of(
             TrialPlan::arbitrary(8, 3),
@@ -213,7 +158,7 @@ impl Experiment {
             "Repeat an arbitrary trial with the excitation at 0.7 of its value.",
             0.5,
         );
-        low.excitation = 0.7;
+        low.plan.excitation = 0.7;
         vec![
             Self::pieces("ramps", "Fill and vent at three openings.", &ramps),
             Self::of(
@@ -248,31 +193,29 @@ impl RigSimulator {
     fn prediction(
         &self,
         model: &Model,
-        experiment: &Experiment,
+        Experiment { plan, pressure_kpa: set_kpa, .. }: &Experiment,
     ) -> Result<Vec<Vec<f64>>, ProblemError> {
         let mut params = TunedRig::of(&self.base, &self.tuned, model).params;
-        let effects = unrecorded(&self.effects, &self.rows, model)?;
-        params[Key::VExc] *= experiment.excitation;
-        let samples = experiment.inlet.len();
-        let mut out = [(); 3].map(|()| vec![0.0; samples]);
+        let effects = self.bench.unrecorded(model)?;
+        params[Key::VExc] *= plan.excitation;
+        let mut out = [(); 3].map(|()| vec![0.0; plan.inlet.len()]);
         let [pressure_kpa, length_mm, bridge_v] = &mut out;
-        match &experiment.drive {
-            Drive::Valves { full } => {
+        match &plan.set_length_mm {
+            None => {
                 let chain = Chain::new(&params, &effects, DT_S, STEP_S)?;
-                let openings = Openings { inlet: &experiment.inlet, outlet: &experiment.outlet };
-                let initial = if *full { 1e-3 * params[Key::PS] } else { 0.0 };
+                let openings = Openings { inlet: &plan.inlet, outlet: &plan.outlet };
                 let recorded = Recorded { pressure_kpa, length_mm, bridge_v };
-                chain.run(&mut chain.memory(), Start::Settled, 0.0, openings, initial, recorded)?;
+                chain.run(&mut chain.memory(), Start::Settled, 0.0, openings, 0.0, recorded)?;
             }
-            Drive::Held { length_mm: length, pressure_kpa: pressure, shunt } => {
+            Some(length) => {
                 let grid = Grid::samples(DT_S)?;
                 let sensing = Sensing::new(&params, &effects, &grid)?;
                 let (mut memory, start) = (sensing.memory(), Start::Settled);
-                let set = (length.as_slice(), shunt.as_slice());
-                sensing.run_shunted(&mut memory, start, 0.0, set, pressure, bridge_v)?;
+                let set = (length.as_slice(), plan.shunt.as_deref().unwrap_or(&[]));
+                sensing.run_shunted(&mut memory, start, 0.0, set, set_kpa, bridge_v)?;
                 let reference = Reference::new(&params, &effects, &grid)?;
                 reference.run(&mut reference.memory(), Start::Settled, length, length_mm)?;
-                pressure_kpa.copy_from_slice(pressure);
+                pressure_kpa.copy_from_slice(set_kpa);
             }
         }
         let has_pressure = self.stage_kinds.contains(&RigStage::Pneumatics);

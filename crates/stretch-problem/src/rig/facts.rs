@@ -1,64 +1,58 @@
 //! The facts of a rig's recording that a diagnosis takes in addition to stages, parameters, effects and trials.
 
-use stretch_gap::{Description, MotionSpec, ParameterSpec, RecordFacts, Recorded, RowsUsed};
+use std::ops::Range;
+
+use stretch_calibrate::PRESSURE;
+use stretch_gap::{MotionSpec, ParameterSpec, RecordFacts, Recorded};
 use stretch_sim::{Key, RigStage};
 
 use super::{
     nominal::TunedParameter,
     record_columns::record_columns,
-    session::{Inputs, RigSession},
-    smooth::Smoothed,
+    session::{Inputs, LENGTH, VALVES},
     timing,
 };
+use crate::bench::{Bench, columns::Columns};
 
-/// The facts of a session; `measured` holds the measured outputs of the stages.
+/// The facts of a session.
 pub(super) fn facts(
-    about: &Description,
-    session: &RigSession,
+    Bench { about, columns, sensor, .. }: &Bench,
     inputs: &Inputs,
     (stage_kinds, tuned): (&[RigStage], &[TunedParameter]),
-    measured: &[Vec<f64>],
 ) -> RecordFacts {
-    let length = about.stages.iter().position(|s| s.channel == "length_mm").unwrap_or(0);
     RecordFacts {
-        is_lost: session.trials.iter().flat_map(|t| &t.is_lost).copied().collect(),
-        rows_used: Some(RowsUsed { used: session.rows.used(), read: session.rows.read }),
+        is_lost: columns.is_lost.clone(),
+        rows_used: Some(columns.rows_used()),
         motion: Some(MotionSpec {
-            values: measured[length].clone(),
+            values: columns.all(LENGTH).to_vec(),
             unit: "mm".into(),
             falling: "inflation".into(),
             rising: "deflation".into(),
         }),
-        signals: signals(session, inputs),
+        signals: signals(inputs),
         columns: record_columns(about, stage_kinds),
-        sensor: stage_kinds.iter().position(|kind| *kind == RigStage::Sensing),
-        command_timing: command_timing(session, tuned),
-        drift_clocks: drift_clocks(session, tuned),
+        sensor: Some(*sensor),
+        command_timing: command_timing(columns.dt_s, tuned),
+        drift_clocks: drift_clocks(columns, tuned),
         ..RecordFacts::default()
     }
 }
 
 /// The openings, and pressure and length smoothed as the stages see them.
-fn signals(session: &RigSession, inputs: &Inputs) -> Vec<Recorded> {
-    let trials = &session.trials;
-    let command = |name: &str, values: Vec<f64>| Recorded {
+fn signals(inputs: &Inputs) -> Vec<Recorded> {
+    let command = |(name, values): (&str, &Vec<f64>)| Recorded {
         is_command: true,
-        ..Recorded::measured(name, "1", values)
+        ..Recorded::measured(name, "1", values.clone())
     };
-    let smooth = |all: &[Smoothed]| all.iter().flat_map(|s| &s.values).copied().collect();
-    let mut out = vec![
-        command("inlet", trials.iter().flat_map(|t| &t.inlet).copied().collect()),
-        command("outlet", trials.iter().flat_map(|t| &t.outlet).copied().collect()),
-        Recorded::measured("length_mm", "mm", smooth(&inputs.length)),
-    ];
-    if !inputs.pressure.is_empty() {
-        out.push(Recorded::measured("pressure_kpa", "kPa", smooth(&inputs.pressure)));
-    }
+    let mut out: Vec<Recorded> = VALVES.into_iter().zip(&inputs.openings).map(command).collect();
+    out.push(Recorded::measured(LENGTH, "mm", inputs.length.values()));
+    let pressure = inputs.pressure.iter();
+    out.extend(pressure.map(|own| Recorded::measured(PRESSURE, "kPa", own.values())));
     out
 }
 
-fn command_timing(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize, ParameterSpec)> {
-    if !timing::is_slow(session.dt_s()) {
+fn command_timing(dt_s: f64, tuned: &[TunedParameter]) -> Vec<(usize, ParameterSpec)> {
+    if !timing::is_slow(dt_s) {
         return Vec::new();
     }
     let timing = |(i, parameter): (usize, &TunedParameter)| match parameter {
@@ -71,10 +65,14 @@ fn command_timing(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize,
 /// Returns the index and the clock of every parameter with a clock (see `RecordFacts::drift_clocks`). The supply
 /// reaches the chamber only through the inlet, so the clock of the supply stops while the inlet is shut. The clock of a
 /// command lead counts the switches of the valves.
-fn drift_clocks(session: &RigSession, tuned: &[TunedParameter]) -> Vec<(usize, Vec<u32>)> {
-    let trials = &session.trials;
-    let switches = || trials.iter().flat_map(|t| timing::switches(&t.inlet, &t.outlet)).collect();
-    let open = || trials.iter().flat_map(|t| last_open(&t.inlet)).collect();
+fn drift_clocks(columns: &Columns, tuned: &[TunedParameter]) -> Vec<(usize, Vec<u32>)> {
+    let trials = || {
+        let of = |range: &Range<usize>| VALVES.map(|name| &columns.all(name)[range.clone()]);
+        columns.ranges.iter().map(of)
+    };
+    let switches =
+        || trials().flat_map(|[inlet, outlet]| timing::switches(inlet, outlet)).collect();
+    let open = || trials().flat_map(|[inlet, _]| last_open(inlet)).collect();
     let clock = |(i, parameter): (usize, &TunedParameter)| match parameter {
         TunedParameter::Rig(Key::PS) => Some((i, open())),
         TunedParameter::CommandLead(_) => Some((i, switches())),

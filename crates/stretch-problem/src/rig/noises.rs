@@ -1,9 +1,11 @@
 //! Noise of the rig's channels, from the recording or from the rig file.
 
+use stretch_calibrate::PRESSURE;
 use stretch_gap::{Noise, SlowDrift, WINDOW};
 use stretch_sim::{Key, RigParams};
 
-use super::session::{RigSession, RigTrial};
+use super::session::{LENGTH, VALVES, VOLTAGE};
+use crate::bench::columns::Columns;
 
 /// The noise is estimated from the windows without a command that begin longest after a command: from this share of all
 /// such windows, but from at least this number of them.
@@ -35,20 +37,18 @@ pub(super) struct Noises {
 impl Noises {
     /// Noise from the windows of the fit trials in which nothing was commanded; if there are too
     /// few such windows, the noise of the rig file.
-    pub(super) fn of(params: &RigParams, session: &RigSession) -> Self {
+    pub(super) fn of(params: &RigParams, columns: &Columns) -> Self {
         // The step of a converter adds a uniform error of variance step^2/12.
         let with_step = |sigma: Key, full_scale: Key| {
             let step = params[full_scale] / (params[Key::Bits].exp2() - 1.0);
             (params[sigma].powi(2) + step * step / 12.0).sqrt()
         };
-        let quiet = quiet(session);
-        let of = |stated: f64, channel: fn(&RigTrial) -> &[f64]| {
-            let window = |&(trial, from): &(usize, usize)| {
-                let values = channel(&session.trials()[trial]);
-                values.get(from..from + WINDOW).unwrap_or(&[]).to_vec()
-            };
+        let quiet = quiet(columns);
+        let of = |stated: f64, channel: &str| {
+            let values = columns.all(channel);
+            let window = |&from: &usize| values.get(from..from + WINDOW).unwrap_or(&[]).to_vec();
             let windows: Vec<Vec<f64>> = quiet.places.iter().map(window).collect();
-            Noise::of_windows(&windows, Some(stated), quiet.is_still, session.dt_s())
+            Noise::of_windows(&windows, Some(stated), quiet.is_still, columns.dt_s)
                 .unwrap_or_else(|| Noise::known(stated))
         };
         let drift = |stated: f64, noise: &Noise| SlowDrift {
@@ -57,36 +57,38 @@ impl Noises {
         };
         let of_length = with_step(Key::SigmaL, Key::Travel);
         let of_volts = with_step(Key::SigmaV, Key::VFs);
-        let length_mm = of(of_length, |t| &t.length_mm);
-        let volts = of(of_volts, |t| &t.bridge_v);
+        let length_mm = of(of_length, LENGTH);
+        let volts = of(of_volts, VOLTAGE);
         Self {
             length_drift: drift(of_length, &length_mm),
             volts_drift: drift(of_volts, &volts),
             length_mm,
             volts,
-            pressure_kpa: of(1e-3 * params[Key::SigmaP], |t| t.pressure_kpa().unwrap_or(&[])),
+            pressure_kpa: of(1e-3 * params[Key::SigmaP], PRESSURE),
         }
     }
 }
 
 /// Windows without a command.
 struct Quiet {
-    /// Trial and first sample of each window.
-    places: Vec<(usize, usize)>,
+    /// First sample of each window.
+    places: Vec<usize>,
     /// Whether all windows begin long after a command.
     is_still: bool,
 }
 
-fn quiet(session: &RigSession) -> Quiet {
-    let mut all: Vec<(usize, (usize, usize))> = Vec::new();
-    for (i, trial) in session.trials().iter().enumerate().filter(|(_, t)| !t.is_test) {
-        let commands: Vec<(f64, f64)> =
-            trial.inlet.iter().copied().zip(trial.outlet.iter().copied()).collect();
-        let mut from = 0;
-        for still in commands.chunk_by(|a, b| a == b) {
+fn quiet(columns: &Columns) -> Quiet {
+    let [inlet, outlet] = VALVES.map(|name| columns.all(name));
+    let commands: Vec<(&f64, &f64)> = inlet.iter().zip(outlet).collect();
+    // The number of samples since the last command, and the first sample.
+    let mut all: Vec<(usize, usize)> = Vec::new();
+    let trials = columns.trials.iter().zip(&columns.ranges);
+    for (_, range) in trials.filter(|(trial, _)| !trial.is_test) {
+        let mut from = range.start;
+        for still in commands[range.clone()].chunk_by(|a, b| a == b) {
             let mut at = 0;
             while at + WINDOW <= still.len() {
-                all.push((at, (i, from + at)));
+                all.push((at, from + at));
                 at += WINDOW / 2;
             }
             from += still.len();
@@ -94,7 +96,7 @@ fn quiet(session: &RigSession) -> Quiet {
     }
     all.sort_by_key(|window| std::cmp::Reverse(window.0));
     let used = ((USED.0 * all.len() as f64) as usize).max(USED.1);
-    let settled = (SETTLED_S / session.dt_s()) as usize;
+    let settled = (SETTLED_S / columns.dt_s) as usize;
     let count = all.iter().filter(|(since, _)| *since >= settled).count();
     let is_still = count >= USED.1;
     all.truncate(if is_still { used.min(count) } else { used });

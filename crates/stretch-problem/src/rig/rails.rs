@@ -1,10 +1,12 @@
 //! Channels that are saturated at an end of the recorder's range.
 
+use stretch_calibrate::PRESSURE;
 use stretch_data::ends;
 use stretch_filter::log::{noise_of_differences, second_differences};
 use stretch_sim::{Key, RigParams};
 
-use super::{RigSession, RigTrial};
+use super::session::{LENGTH, VOLTAGE};
+use crate::bench::columns::Columns;
 
 /// Share of the samples at one value above which chance does not explain the repeated value.
 const SHARE: f64 = 0.002;
@@ -13,21 +15,20 @@ const SHARE: f64 = 0.002;
 const NOISY: f64 = 0.3;
 
 /// A sentence for every end of a channel that holds more samples than noise explains.
-pub(super) fn rails(params: &RigParams, session: &RigSession) -> Vec<String> {
-    type Channel = fn(&RigTrial) -> Option<&[f64]>;
-    let channels: [(&str, &str, f64, Channel); 3] = [
-        ("bridge_v", "V", params[Key::SigmaV], |t| Some(t.bridge_v())),
-        ("length_mm", "mm", params[Key::SigmaL], |t| Some(t.length_mm())),
-        ("pressure_kpa", "kPa", 1e-3 * params[Key::SigmaP], RigTrial::pressure_kpa),
+pub(super) fn rails(params: &RigParams, columns: &Columns) -> Vec<String> {
+    let channels = [
+        (VOLTAGE, "V", params[Key::SigmaV]),
+        (LENGTH, "mm", params[Key::SigmaL]),
+        (PRESSURE, "kPa", 1e-3 * params[Key::SigmaP]),
     ];
     let mut said = Vec::new();
-    for (column, unit, sigma, of) in channels {
-        let values: Vec<f64> = session.trials().iter().filter_map(of).flatten().copied().collect();
-        let (low, high) = ends(&values);
+    for (column, unit, sigma) in channels {
+        let values = columns.all(column);
+        let (low, high) = ends(values);
         for (end, which) in [(low, "least"), (high, "greatest")] {
             let share =
                 values.iter().filter(|v| **v == end).count() as f64 / values.len().max(1) as f64;
-            if share > SHARE && noise_off(&values, end) > NOISY * sigma {
+            if share > SHARE && noise_off(values, end) > NOISY * sigma {
                 said.push(format!(
                     "{column} is at {end} {unit}, its {which} value, in {:.1} % of the samples: its recorder looks saturated, \
                      and all values beyond it are lost; change range, gain or zero",
@@ -51,6 +52,7 @@ mod tests {
     use stretch_data::{Channel, SessionTrial, Trial};
 
     use super::*;
+    use crate::RigSession;
 
     #[test]
     fn an_end_is_told_from_a_rest() {
@@ -73,7 +75,7 @@ mod tests {
                 ],
             };
             let session = RigSession::new(&[SessionTrial::new(trial)]).expect("a session");
-            rails(&RigParams::default(), &session)
+            rails(&RigParams::default(), &session.columns)
         };
         assert!(said(at(9.0, 0.01)).is_empty());
         let clipped = said(at(0.5, 0.01));

@@ -8,12 +8,10 @@ use stretch_sim::{Key, RigStage};
 
 use super::{
     RigSimulator,
-    session::{Inputs, RigTrial},
+    session::{Inputs, LENGTH, VALVES, VOLTAGE},
 };
-use crate::bench::specs::skew_of;
+use crate::bench::skew_of;
 
-pub(super) const LENGTH: &str = "length_mm";
-const VOLTAGE: &str = "bridge_v";
 pub(super) const COMMANDS: &str = "inlet, outlet";
 
 /// Range of the delays of the voltage if the catalogue has no skew, s.
@@ -76,38 +74,31 @@ pub(super) fn record_columns(
 }
 
 impl RigSimulator {
-    /// The rig with a session in which one column is corrected; `None` if the column drives no
-    /// stage. The measured outputs stay as they are.
+    /// The rig on inputs in which one column is corrected; `None` if the column drives no stage.
+    /// The measured outputs stay as they are.
     pub(super) fn with_corrected(&self, column: &str, error: Distortion) -> Option<Self> {
-        let dt_s = self.about.dt_s;
-        let mut rig = self.clone();
-        let correct = |values: &mut Vec<f64>| *values = error.undone(values, dt_s);
-        let each = |trials: &mut Vec<RigTrial>, of: fn(&mut RigTrial) -> Option<&mut Vec<f64>>| {
-            trials.iter_mut().filter_map(of).for_each(correct);
-        };
-        let trials = &mut rig.session.trials;
-        match column {
-            PRESSURE => each(trials, |t| t.pressure_kpa.as_mut()),
-            LENGTH => each(trials, |t| Some(&mut t.length_mm)),
-            COMMANDS => {
-                for trial in trials {
-                    for valve in [&mut trial.inlet, &mut trial.outlet] {
-                        correct(valve);
-                        // An opening stays between shut (0) and open (1).
-                        valve.iter_mut().for_each(|opening| *opening = opening.clamp(0.0, 1.0));
-                    }
-                }
-            }
+        let names: &[&str] = match column {
+            PRESSURE => &[PRESSURE],
+            LENGTH => &[LENGTH],
+            COMMANDS => &VALVES,
             _ => return None,
+        };
+        let mut columns = self.bench.columns.clone();
+        for (name, values) in columns.names.iter().zip(&mut columns.values) {
+            if !names.contains(&name.as_str()) {
+                continue;
+            }
+            for range in &columns.ranges {
+                let own = &mut values[range.clone()];
+                own.copy_from_slice(&error.undone(own, columns.dt_s));
+            }
+            if column == COMMANDS {
+                // An opening stays between shut (0) and open (1).
+                values.iter_mut().for_each(|opening| *opening = opening.clamp(0.0, 1.0));
+            }
         }
-        let noise = |own: &str, sd: f64| if own == column { sd / error.scale.abs() } else { sd };
-        let supply_kpa = 1e-3 * rig.base[Key::PS];
-        rig.inputs = Inputs::of(
-            &rig.session,
-            noise(LENGTH, rig.noises.length_mm.sd()),
-            noise(PRESSURE, rig.noises.pressure_kpa.sd()),
-            supply_kpa,
-        );
-        Some(rig)
+        let (corrected, supply_kpa) = ((column, error.scale.abs()), 1e-3 * self.base[Key::PS]);
+        let inputs = Inputs::of(&columns, &self.noises, Some(corrected), supply_kpa);
+        Some(Self { inputs, ..self.clone() })
     }
 }

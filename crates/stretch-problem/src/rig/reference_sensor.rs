@@ -2,13 +2,12 @@
 
 use stretch_sim::{EffectSet, Grid, Memory, Reference, RigParams, RigStage, Start};
 
-use super::run::set_initial_state;
 use crate::error::ProblemError;
 
 /// The reference sensor behind a stage, skipped if no effect acts in the reference.
 pub(super) struct ReferenceSensor {
-    stage: Reference,
-    memory: Memory,
+    pub(super) stage: Reference,
+    pub(super) memory: Memory,
     acts: bool,
     work: Vec<f64>,
 }
@@ -23,21 +22,6 @@ impl ReferenceSensor {
         let acts = effects.acting_in(RigStage::Reference).next().is_some();
         let memory = stage.memory();
         Ok(Self { stage, memory, acts, work: Vec::new() })
-    }
-
-    /// Sets the initial state of the reference: moves it by a share towards the state of a reference that has settled
-    /// at a length.
-    pub(super) fn set_initial_state(
-        &mut self,
-        share: f64,
-        after_pause: Start,
-        length: &[f64],
-    ) -> Result<(), ProblemError> {
-        let Self { stage, memory, .. } = self;
-        let mut out = vec![0.0; length.len()];
-        set_initial_state(share, after_pause, memory, stage.memory(), |memory, start| {
-            Ok(stage.run(memory, start, length, &mut out)?)
-        })
     }
 
     pub(super) fn condition(&mut self, length: &[f64]) -> Result<(), ProblemError> {

@@ -9,10 +9,13 @@ use stretch_sim::{
 };
 
 use super::{
-    RigSimulator, RigTrial, nominal::TunedRig, reference_sensor::ReferenceSensor, session::Begin,
-    smooth::cubic, timing, timing::Leads,
+    RigSimulator, nominal::TunedRig, reference_sensor::ReferenceSensor, session::Begin, timing,
+    timing::Leads,
 };
-use crate::{bench::acting::Acting, error::ProblemError};
+use crate::{
+    bench::{Acting, finite, smooth::cubic},
+    error::ProblemError,
+};
 
 /// Step of integration while fitting, s.
 const STEP_S: f64 = 2.0 * DEFAULT_STEP_S;
@@ -60,16 +63,17 @@ pub(super) fn simulate(
     let tuned = TunedRig::of(&rig.base, &rig.tuned, run.model);
     let TunedRig { params, offset, leads, initial_muscle, initial_gauge } = tuned;
     let initial_share = if kind == RigStage::Sensing { initial_gauge } else { initial_muscle };
-    let acting = Acting::of(&rig.effects, &rig.rows, run.model)?;
+    let acting = rig.bench.acting(run.model)?;
+    let dt_s = rig.bench.about.dt_s;
     let step_s = run.step * STEP_S;
     let grid = match kind {
         // These stages are driven by a measured input.
         RigStage::Muscle | RigStage::Sensing => {
             let is_fine = acting.inside.acting_in(kind).any(|e| e.effect().needs_fine_steps());
             let pieces = if is_fine { PIECES } else { 1.0 };
-            Grid::new(rig.about.dt_s, run.step.min(1.0) * rig.about.dt_s / pieces, 0.0)?
+            Grid::new(dt_s, run.step.min(1.0) * dt_s / pieces, 0.0)?
         }
-        _ => acting.inside.grid(&params, rig.about.dt_s, step_s)?,
+        _ => acting.inside.grid(&params, dt_s, step_s)?,
     };
     let setting = Setting {
         rig,
@@ -91,11 +95,18 @@ pub(super) fn simulate(
         RigStage::Sensing => setting.sensing(run.trials, &acting, out)?,
         _ => setting.actuation(run.trials, out)?,
     }
-    if out.iter().all(|x| x.is_finite()) {
-        Ok(())
-    } else {
-        Err(ProblemError::NotFinite { stage: rig.about.stages[run.stage].name.clone() })
-    }
+    finite(&rig.bench.about.stages[run.stage].name, out)
+}
+
+/// A part of the session that a stage runs over.
+#[derive(Debug, Clone, Copy)]
+enum At {
+    /// Two samples before the session, at the other end of the stroke.
+    Before,
+    /// The first sample of the session.
+    First,
+    /// A trial.
+    Trial(usize),
 }
 
 impl Setting<'_> {
@@ -109,11 +120,11 @@ impl Setting<'_> {
     }
 
     pub(super) fn after_pause(&self, trial: usize) -> Start {
-        let trials = &self.rig.about.trials;
+        let trials = &self.rig.bench.about.trials;
         let rest_s = match trial.checked_sub(1) {
             Some(before) => {
-                let end =
-                    trials[before].start_s + trials[before].samples as f64 * self.rig.about.dt_s;
+                let end = trials[before].start_s
+                    + trials[before].samples as f64 * self.rig.bench.about.dt_s;
                 trials[trial].start_s - end
             }
             None => 15.0,
@@ -122,14 +133,32 @@ impl Setting<'_> {
         Start::Carried { rest_s: (rest_s - 1.0).max(0.0) }
     }
 
-    /// Sets the initial state of the stage's memory, which was left at the other end of the stroke.
+    /// Sets the memory that a stage has of the motion before the session.
+    ///
+    /// As a rule a muscle that is vented at the session's start was filled before, so play and creep
+    /// begin from the filled side. A rig that had settled (just switched on, or simulated) remembers no
+    /// such motion. The initial state lies between the two. The share is a parameter of the recording:
+    ///
+    /// ```text
+    /// cells = moved + share (settled - moved)
+    /// ```
+    ///
+    /// The function moves a memory that was left at the other end of the stroke towards the memory of a stage that
+    /// settled where the session begins. `begin` runs a stage with a memory at the session's first sample, so that the
+    /// first trial follows without a pause.
     fn set_initial_state(
         &self,
+        share: f64,
         memory: &mut Memory,
-        settled: Memory,
-        begin: impl FnMut(&mut Memory, Start) -> Result<(), ProblemError>,
+        mut settled: Memory,
+        mut begin: impl FnMut(&mut Memory, Start) -> Result<(), ProblemError>,
     ) -> Result<(), ProblemError> {
-        set_initial_state(self.initial_share, self.after_pause(0), memory, settled, begin)
+        if share > 0.0 {
+            begin(memory, self.after_pause(0))?;
+            begin(&mut settled, Start::Settled)?;
+            memory.move_towards(&settled, share);
+        }
+        Ok(())
     }
 
     /// Sets the initial state of the reference, which follows the muscle.
@@ -138,12 +167,16 @@ impl Setting<'_> {
         shown: &mut ReferenceSensor,
         length: &[f64],
     ) -> Result<(), ProblemError> {
-        shown.set_initial_state(self.initial_muscle, self.after_pause(0), length)
+        let ReferenceSensor { stage, memory, .. } = shown;
+        let mut out = vec![0.0; length.len()];
+        self.set_initial_state(self.initial_muscle, memory, stage.memory(), |memory, start| {
+            Ok(stage.run(memory, start, length, &mut out)?)
+        })
     }
 
     fn is_vented(&self) -> bool {
         let inputs = &self.rig.inputs;
-        let first = inputs.length[0].values.first().copied().unwrap_or(0.0);
+        let first = inputs.length.first(0).unwrap_or(0.0);
         first > 0.5 * (inputs.stroke.0 + inputs.stroke.1)
     }
 
@@ -184,29 +217,28 @@ impl Setting<'_> {
 
     /// Inlet and outlet, with commands that act ahead of their rows.
     pub(super) fn openings(&self, trial: usize) -> [Cow<'_, [f64]>; 2] {
-        let own = &self.rig.session.trials[trial];
-        timing::ahead(&own.inlet, &own.outlet, self.leads)
+        let range = &self.rig.bench.columns.ranges[trial];
+        let [inlet, outlet] = self.rig.inputs.openings.each_ref().map(|all| &all[range.clone()]);
+        timing::ahead(inlet, outlet, self.leads)
     }
 
-    /// A measured input of the stage, smoothed, with a random draw of its noise if the run requests
-    /// one.
-    fn input(&self, trial: usize, of_pressure: bool) -> Vec<f64> {
-        if let Some(given) = self.given.filter(|_| of_pressure == (self.kind == RigStage::Muscle)) {
-            let trials = &self.rig.about.trials;
-            let from = trials[..trial].iter().map(|t| t.samples).sum::<usize>();
-            return given[from..from + trials[trial].samples].to_vec();
-        }
-        let inputs = &self.rig.inputs;
-        let input = if of_pressure { &inputs.pressure[trial] } else { &inputs.length[trial] };
-        let Some(seed) = self.input_noise else { return input.values.clone() };
-        let noises = &self.rig.noises;
-        match of_pressure {
-            true => {
-                let draws = &inputs.pressure_draws;
-                draws.with_noise(&inputs.pressure, &noises.pressure_kpa, seed, trial)
-            }
-            false => inputs.length_draws.with_noise(&inputs.length, &noises.length_mm, seed, trial),
-        }
+    /// The measured length, smoothed, with a random draw of its noise if the run requests one; the given input if the
+    /// length drives the stage.
+    fn length(&self, trial: usize) -> Vec<f64> {
+        self.given(trial, self.kind != RigStage::Muscle)
+            .unwrap_or_else(|| self.rig.inputs.length.trial(trial, self.input_noise))
+    }
+
+    /// The pressure, as [`Setting::length`]; `None` if it was not recorded.
+    fn pressure(&self, trial: usize) -> Option<Vec<f64>> {
+        let measured = || Some(self.rig.inputs.pressure.as_ref()?.trial(trial, self.input_noise));
+        self.given(trial, self.kind == RigStage::Muscle).or_else(measured)
+    }
+
+    /// The part of the given input that belongs to a trial.
+    fn given(&self, trial: usize, drives: bool) -> Option<Vec<f64>> {
+        let given = self.given.filter(|_| drives)?;
+        Some(given[self.rig.bench.columns.ranges[trial].clone()].to_vec())
     }
 
     /// Visits every trial with its part of the output.
@@ -216,7 +248,7 @@ impl Setting<'_> {
         mut out: &mut [f64],
         mut visit: impl FnMut(usize, &mut [f64]) -> Result<(), ProblemError>,
     ) -> Result<(), ProblemError> {
-        for (trial, spec) in self.rig.about.trials[..count].iter().enumerate() {
+        for (trial, spec) in self.rig.bench.about.trials[..count].iter().enumerate() {
             let (own, rest) = out.split_at_mut(spec.samples);
             visit(trial, own)?;
             out = rest;
@@ -232,7 +264,7 @@ impl Setting<'_> {
             let openings = Openings { inlet: &inlet, outlet: &outlet };
             let initial = self.initial_kpa(trial);
             if stage.is_coupled() {
-                let length = self.input(trial, false);
+                let length = self.length(trial);
                 stage.run_with_length(&mut memory, start, openings, &length, initial, own)?;
             } else {
                 stage.run(&mut memory, start, openings, initial, own)?;
@@ -243,68 +275,81 @@ impl Setting<'_> {
 
     pub(super) fn muscle(&self, count: usize, out: &mut [f64]) -> Result<(), ProblemError> {
         let stage = Muscle::new(&self.params, &self.effects, &self.grid)?;
-        let mut memory = stage.memory();
-        let mut shown = self.shown(&self.effects)?;
         let before = self.before_kpa();
-        let mut filled = [0.0; 2];
-        stage.run(&mut memory, Start::Settled, &[before; 2], &mut filled)?;
-        shown.condition(&filled)?;
-        let first = self.input(0, true).first().copied().unwrap_or(before);
-        let mut begun = [0.0];
-        self.set_initial_state(&mut memory, stage.memory(), |memory, start| {
-            Ok(stage.run(memory, start, &[first], &mut begun)?)
-        })?;
-        self.set_reference_state(&mut shown, &begun)?;
-        self.each(count, out, |trial, own| {
-            stage.run(&mut memory, self.start(trial), &self.input(trial, true), own)?;
-            shown.run(self.start(trial), own)
-        })
+        let pressure = |trial: usize| self.pressure(trial).unwrap_or_default();
+        self.lengths(
+            count,
+            out,
+            || stage.memory(),
+            |memory, start, at, own| {
+                let pressure = match at {
+                    At::Before => vec![before; own.len()],
+                    At::First => vec![pressure(0).first().copied().unwrap_or(before)],
+                    At::Trial(trial) => pressure(trial),
+                };
+                Ok(stage.run(memory, start, &pressure, own)?)
+            },
+        )
     }
 
     pub(super) fn actuation(&self, count: usize, out: &mut [f64]) -> Result<(), ProblemError> {
         let stage = Actuation::new(&self.params, &self.effects, &self.grid)?;
-        let mut memory = stage.memory();
-        let mut shown = self.shown(&self.effects)?;
         let before = self.before_kpa();
-        let mut filled = [0.0; 2];
         if !stage.is_coupled() {
-            let nodes = stage.grid().nodes(filled.len());
-            stage.run_length(&mut memory, Start::Settled, &vec![before; nodes], &mut filled)?;
-            shown.condition(&filled)?;
             let pressure = self.chamber_kpa(&stage, count)?;
             let first = pressure.first().and_then(|p| p.first()).copied().unwrap_or(before);
-            let mut begun = [0.0];
-            self.set_initial_state(&mut memory, stage.memory(), |memory, start| {
-                Ok(stage.run_length(memory, start, &[first], &mut begun)?)
-            })?;
-            self.set_reference_state(&mut shown, &begun)?;
-            return self.each(count, out, |trial, own| {
-                stage.run_length(&mut memory, self.start(trial), &pressure[trial], own)?;
-                shown.run(self.start(trial), own)
-            });
+            return self.lengths(
+                count,
+                out,
+                || stage.memory(),
+                |memory, start, at, own| {
+                    let held = match at {
+                        At::Before => vec![before; stage.grid().nodes(own.len())],
+                        At::First => vec![first],
+                        At::Trial(trial) => {
+                            return Ok(stage.run_length(memory, start, &pressure[trial], own)?);
+                        }
+                    };
+                    Ok(stage.run_length(memory, start, &held, own)?)
+                },
+            );
         }
-        let shut = [0.0; 2];
-        let openings = Openings { inlet: &shut, outlet: &shut };
-        stage.run(&mut memory, Start::Settled, openings, before, &mut [0.0; 2], &mut filled)?;
+        self.lengths(
+            count,
+            out,
+            || stage.memory(),
+            |memory, start, at, own| {
+                let shut = || Cow::Owned(vec![0.0; own.len()]);
+                let ([inlet, outlet], initial) = match at {
+                    At::Before => ([shut(), shut()], before),
+                    At::First => ([shut(), shut()], self.initial_kpa(0)),
+                    At::Trial(trial) => (self.openings(trial), self.initial_kpa(trial)),
+                };
+                let openings = Openings { inlet: &inlet, outlet: &outlet };
+                let mut pressure = vec![0.0; own.len()];
+                Ok(stage.run(memory, start, openings, initial, &mut pressure, own)?)
+            },
+        )
+    }
+
+    /// Lengths of a stage as the reference shows them. `run` runs the stage over a part of the session.
+    fn lengths(
+        &self,
+        count: usize,
+        out: &mut [f64],
+        fresh: impl Fn() -> Memory,
+        run: impl Fn(&mut Memory, Start, At, &mut [f64]) -> Result<(), ProblemError>,
+    ) -> Result<(), ProblemError> {
+        let (mut memory, mut shown) = (fresh(), self.shown(&self.effects)?);
+        let (mut filled, mut begun) = ([0.0; 2], [0.0]);
+        run(&mut memory, Start::Settled, At::Before, &mut filled)?;
         shown.condition(&filled)?;
-        let (initial, mut begun) = (self.initial_kpa(0), [0.0]);
-        let shut = Openings { inlet: &[0.0], outlet: &[0.0] };
-        self.set_initial_state(&mut memory, stage.memory(), |memory, start| {
-            Ok(stage.run(memory, start, shut, initial, &mut [0.0], &mut begun)?)
+        self.set_initial_state(self.initial_share, &mut memory, fresh(), |memory, start| {
+            run(memory, start, At::First, &mut begun)
         })?;
         self.set_reference_state(&mut shown, &begun)?;
-        let mut pressure = Vec::new();
         self.each(count, out, |trial, own| {
-            pressure.resize(own.len(), 0.0);
-            let [inlet, outlet] = self.openings(trial);
-            stage.run(
-                &mut memory,
-                self.start(trial),
-                Openings { inlet: &inlet, outlet: &outlet },
-                self.initial_kpa(trial),
-                &mut pressure,
-                own,
-            )?;
+            run(&mut memory, self.start(trial), At::Trial(trial), own)?;
             shown.run(self.start(trial), own)
         })
     }
@@ -322,7 +367,8 @@ impl Setting<'_> {
             .effects
             .acting_in(RigStage::Sensing)
             .any(|e| e.effect().needs == Some(Need::Pressure));
-        let pressures = match needs_pressure && self.rig.inputs.pressure.is_empty() {
+        let has_pressure = self.rig.inputs.pressure.is_some();
+        let pressures = match needs_pressure && !has_pressure {
             true => self.simulated_pressure(count)?,
             false => Arc::default(),
         };
@@ -334,44 +380,43 @@ impl Setting<'_> {
             stage.run(
                 &mut memory,
                 Start::Settled,
-                self.rig.about.trials[0].start_s,
+                self.rig.bench.about.trials[0].start_s,
                 &vec![before; nodes],
                 &vec![kpa; nodes],
                 &mut volts,
             )?;
-            let first = |of_pressure: bool, other: f64| match of_pressure {
-                true if self.rig.inputs.pressure.is_empty() => other,
-                _ => self.input(0, of_pressure).first().copied().unwrap_or(other),
-            };
-            let mut length = [first(false, before)];
+            let mut length = [self.length(0).first().copied().unwrap_or(before)];
             shown.undo(&mut length);
-            let (pressure, mut volts) = ([first(true, self.initial_kpa(0))], [0.0]);
-            self.set_initial_state(&mut memory, stage.memory(), |memory, start| {
-                let start_s = self.rig.about.trials[0].start_s;
-                Ok(stage.run(memory, start, start_s, &length, &pressure, &mut volts)?)
-            })?;
+            let first = self.pressure(0).and_then(|pressure| pressure.first().copied());
+            let (pressure, mut volts) = ([first.unwrap_or_else(|| self.initial_kpa(0))], [0.0]);
+            self.set_initial_state(
+                self.initial_share,
+                &mut memory,
+                stage.memory(),
+                |memory, start| {
+                    let start_s = self.rig.bench.about.trials[0].start_s;
+                    Ok(stage.run(memory, start, start_s, &length, &pressure, &mut volts)?)
+                },
+            )?;
         }
         let dimmed = self.dimmed(count)?;
         let hidden = self.hidden(count)?;
-        let mut from = 0;
         self.each(count, out, |trial, own| {
-            let mut length = self.input(trial, false);
+            let mut length = self.length(trial);
             if let Some(hidden) = &hidden {
-                length.iter_mut().zip(&hidden[from..]).for_each(|(x, h)| *x += h);
-                from += own.len();
+                let hidden = &hidden[self.rig.bench.columns.ranges[trial].clone()];
+                length.iter_mut().zip(hidden).for_each(|(x, h)| *x += h);
             }
             shown.undo(&mut length);
-            let pressure = match (needs_pressure, self.rig.inputs.pressure.is_empty()) {
-                (false, _) => Vec::new(),
-                (true, false) => self.input(trial, true),
-                (true, true) => pressures[trial].clone(),
+            let pressure = match needs_pressure {
+                true => self.pressure(trial).unwrap_or_else(|| pressures[trial].clone()),
+                false => Vec::new(),
             };
-            let start_s = self.rig.about.trials[trial].start_s;
+            let start_s = self.rig.bench.about.trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
             let stage = dimmed.get(trial).and_then(Option::as_ref).unwrap_or(&stage);
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
-            let record = self.rig.bridge.of_trial(trial, self.rig.noises.volts.sd(), 1.0);
-            acting.follow(record, own);
+            acting.follow(self.rig.bench.record(trial), own);
             Ok(())
         })
     }
@@ -379,13 +424,13 @@ impl Setting<'_> {
     /// For each trial, the sensing stage if the excitation of the bridge is not the usual one,
     /// otherwise `None`. All trials share the memory of the gauge.
     fn dimmed(&self, count: usize) -> Result<Vec<Option<Sensing>>, ProblemError> {
-        let one = |trial: &RigTrial| {
+        let one = |excitation: &f64| {
             let mut params = self.params;
-            params[Key::VExc] *= trial.excitation;
+            params[Key::VExc] *= excitation;
             let stage = || Ok(Sensing::new(&params, &self.effects, &self.grid)?);
-            (trial.excitation != 1.0).then(stage).transpose()
+            (*excitation != 1.0).then(stage).transpose()
         };
-        self.rig.session.trials[..count].iter().map(one).collect()
+        self.rig.excitation[..count].iter().map(one).collect()
     }
 
     /// Samples at every node of the grid, interpolated by cubics through four samples.
@@ -401,34 +446,6 @@ impl Setting<'_> {
     }
 
     pub(super) fn shown(&self, effects: &EffectSet) -> Result<ReferenceSensor, ProblemError> {
-        ReferenceSensor::new(&self.params, effects, self.rig.about.dt_s)
+        ReferenceSensor::new(&self.params, effects, self.rig.bench.about.dt_s)
     }
-}
-
-/// Sets the memory that a stage has of the motion before the session.
-///
-/// As a rule a muscle that is vented at the session's start was filled before, so play and creep
-/// begin from the filled side. A rig that had settled (just switched on, or simulated) remembers no
-/// such motion. The initial state lies between the two. The share is a parameter of the recording:
-///
-/// ```text
-/// cells = moved + share (settled - moved)
-/// ```
-///
-/// The function moves a memory that was left at the other end of the stroke towards the memory of a stage that settled
-/// where the session begins. `begin` runs a stage with a memory at the session's first sample, so that the first trial
-/// follows without a pause.
-pub(super) fn set_initial_state(
-    share: f64,
-    after_pause: Start,
-    memory: &mut Memory,
-    mut settled: Memory,
-    mut begin: impl FnMut(&mut Memory, Start) -> Result<(), ProblemError>,
-) -> Result<(), ProblemError> {
-    if share > 0.0 {
-        begin(memory, after_pause)?;
-        begin(&mut settled, Start::Settled)?;
-        memory.move_towards(&settled, share);
-    }
-    Ok(())
 }

@@ -1,26 +1,34 @@
 //! The measured session: trials as a rig needs them, checked.
 
-use std::path::Path;
+use std::{ops::Range, path::Path};
 
 use stretch_calibrate::PRESSURE;
-use stretch_data::{DataSet, EvenSession, EvenTrial, Rows, SessionTrial, Split, ends};
-use stretch_gap::{copied, noise_variance};
+use stretch_data::{DataSet, SessionTrial, Split, ends};
+use stretch_gap::{Noise, TrialSpec, copied, noise_variance};
 use stretch_recording::{ReadOptions, Recording};
 
-use super::directions::{self, Motion};
-use super::smooth::{Draws, Smoothed, schedule};
-use super::timing::{is_slow, switched};
+use super::{
+    directions::{self, Motion},
+    noises::Noises,
+    timing::{is_slow, switched},
+};
 use crate::{
     bench::{
+        columns::Columns,
         isolated_outliers::without_isolated_outliers,
         shortened::shortened,
-        undetermined::{undetermined, undetermined_behind_gap},
+        smooth::{MeasuredInput, Smoothed, schedule},
+        straight_line,
     },
     error::{ProblemError, check_rate},
 };
 
+/// Columns of the valves' openings, of the length and of the bridge voltage.
+pub(super) const VALVES: [&str; 2] = ["inlet", "outlet"];
+pub(super) const LENGTH: &str = "length_mm";
+pub(super) const VOLTAGE: &str = "bridge_v";
 /// Columns that a rig needs; the pressure is optional.
-const NEEDED: [&str; 4] = ["inlet", "outlet", "length_mm", "bridge_v"];
+const NEEDED: [&str; 4] = [VALVES[0], VALVES[1], LENGTH, VOLTAGE];
 /// Simulated outputs: pressure, length and voltage.
 const OUTPUTS: usize = 3;
 /// Column of the bridge's excitation, a share of the nominal one, the same throughout a trial; 1 if
@@ -33,73 +41,12 @@ const NOISE_SPAN: f64 = 15.0;
 /// Smallest number of samples to fit.
 const LEAST: usize = 300;
 
-/// A measured trial of the rig, on the session's even grid; all channels have the same length.
-#[derive(Debug, Clone)]
-pub struct RigTrial {
-    pub(super) name: String,
-    pub(super) start_s: f64,
-    pub(super) is_test: bool,
-    pub(super) inlet: Vec<f64>,
-    pub(super) outlet: Vec<f64>,
-    pub(super) pressure_kpa: Option<Vec<f64>>,
-    pub(super) length_mm: Vec<f64>,
-    pub(super) bridge_v: Vec<f64>,
-    /// Marks samples that were lost, and samples that a gap before them leaves undetermined.
-    pub(super) is_lost: Vec<bool>,
-    /// Whether the trial continues the trial before it after a gap.
-    goes_on: bool,
-    /// Excitation of the bridge, a share of the nominal one.
-    pub(super) excitation: f64,
-}
-
-impl RigTrial {
-    /// The trial of a session whose columns are [`NEEDED`], followed by the pressure if there is one; `before` is the
-    /// trial before it.
-    fn of(trial: &EvenTrial, before: Option<&EvenTrial>, excitation: f64, dt_s: f64) -> Self {
-        let goes_on = before.is_some_and(|before| before.source() == trial.source());
-        let column = |i: usize| trial.columns().get(i).cloned();
-        let needed = |i: usize| column(i).unwrap_or_default();
-        Self {
-            name: trial.name().to_owned(),
-            start_s: trial.start_s(),
-            is_test: trial.is_test(),
-            inlet: needed(0),
-            outlet: needed(1),
-            length_mm: needed(2),
-            bridge_v: needed(3),
-            pressure_kpa: column(4),
-            is_lost: match goes_on {
-                true => undetermined_behind_gap(trial.is_lost(), dt_s),
-                false => undetermined(trial.is_lost()),
-            },
-            goes_on,
-            excitation,
-        }
-    }
-
-    /// Gauge pressure, kPa, if every trial of the session has one.
-    pub fn pressure_kpa(&self) -> Option<&[f64]> {
-        self.pressure_kpa.as_deref()
-    }
-
-    /// Measured length, mm.
-    pub fn length_mm(&self) -> &[f64] {
-        &self.length_mm
-    }
-
-    /// Bridge voltage, V.
-    pub fn bridge_v(&self) -> &[f64] {
-        &self.bridge_v
-    }
-}
-
 /// A measured session of the rig, with notes on the reading: at least one trial, and at least one that may be fitted.
 #[derive(Debug, Clone)]
 pub struct RigSession {
-    pub(super) trials: Vec<RigTrial>,
-    dt_s: f64,
-    pub(super) rows: Rows,
-    pub(super) notes: Vec<String>,
+    pub(super) columns: Columns,
+    /// By trial, the excitation of the bridge as a share of the nominal one.
+    pub(super) excitation: Vec<f64>,
 }
 
 impl RigSession {
@@ -113,7 +60,7 @@ impl RigSession {
     }
 
     /// Binds trials with the columns `inlet`, `outlet` (0..1), `length_mm`, `bridge_v` and, if it
-    /// was recorded, `pressure_kpa`. The trials are brought onto one even grid ([`EvenSession`]):
+    /// was recorded, `pressure_kpa`. The trials are brought onto one even grid ([`EvenSession`](stretch_data::EvenSession)):
     /// lost samples are bridged, a long gap in time splits a trial into two, and the notes name
     /// both. Without a test trial nothing is held back here: the diagnosis then tests on the last
     /// part of each trial.
@@ -124,10 +71,7 @@ impl RigSession {
     pub fn new(trials: &[SessionTrial]) -> Result<Self, ProblemError> {
         let (trials, cut) = shortened(trials, OUTPUTS)?;
         let with = trials.iter().filter(|t| t.trial.channel(PRESSURE).is_some()).count();
-        let mut columns = NEEDED.to_vec();
-        if with == trials.len() {
-            columns.push(PRESSURE);
-        }
+        let has_pressure = with == trials.len();
         if trials.iter().all(|t| t.split == Split::Test) {
             let hint = "give at least one trial that is not a test trial";
             return Err(ProblemError::too_little("no trial may be fitted", hint));
@@ -136,78 +80,69 @@ impl RigSession {
         // Outliers are replaced before resampling, because resampling would spread an outlier over
         // its neighbours.
         let (trials, outlier_notes) = without_isolated_outliers(trials.into_owned());
-        let trials = &trials[..];
-        let even = EvenSession::new(trials, &columns, SHORTEST)?;
-        check_rate(even.dt_s())?;
-        let before = std::iter::once(None).chain(even.trials().iter().map(Some));
-        let of =
-            |(t, before): (&EvenTrial, _)| RigTrial::of(t, before, shares[t.source()], even.dt_s());
-        let mut session = Self {
-            trials: even.trials().iter().zip(before).map(of).collect(),
-            dt_s: even.dt_s(),
-            rows: even.rows(),
-            notes: cut
-                .into_iter()
-                .chain(even.notes().iter().cloned())
-                .chain(outlier_notes)
-                .collect(),
-        };
-        if with > 0 && with < trials.len() {
-            session.notes.push(format!(
+        let names = NEEDED.into_iter().chain(has_pressure.then_some(PRESSURE));
+        let mut columns = Columns::even(&trials, names.map(str::to_owned).collect(), SHORTEST)?;
+        check_rate(columns.dt_s)?;
+        columns.notes.splice(0..0, cut);
+        columns.notes.extend(outlier_notes);
+        if with > 0 && !has_pressure {
+            columns.notes.push(format!(
                 "only {with} of {} trials have a pressure column: it is left out",
                 trials.len()
             ));
         }
+        columns.mark_undetermined(true);
+        let excitation = columns.sources.iter().map(|source| shares[*source]).collect();
+        let session = Self { columns, excitation };
         session.check()?;
         Ok(session)
     }
 
     /// The trials, in the order of time.
-    pub fn trials(&self) -> &[RigTrial] {
-        &self.trials
+    pub fn trials(&self) -> &[TrialSpec] {
+        &self.columns.trials
+    }
+
+    /// A column, all trials end to end; empty for a pressure that was not recorded in every trial.
+    pub fn column(&self, name: &str) -> &[f64] {
+        self.columns.all(name)
     }
 
     /// Notes on the reading, in sentences for a report.
     pub fn notes(&self) -> &[String] {
-        &self.notes
+        &self.columns.notes
     }
 
     /// Sample time of every trial, s.
     pub fn dt_s(&self) -> f64 {
-        self.dt_s
+        self.columns.dt_s
     }
 
     fn check(&self) -> Result<(), ProblemError> {
-        let fit: usize = self.trials.iter().filter(|t| !t.is_test).map(|t| t.inlet.len()).sum();
+        let fit: usize = self.trials().iter().filter(|t| !t.is_test).map(|t| t.samples).sum();
         if fit < LEAST {
             return Err(ProblemError::few_samples(fit, LEAST));
         }
         self.check_units()
     }
 
-    fn range(&self, column: impl Fn(&RigTrial) -> &[f64]) -> (f64, f64) {
-        ends(self.trials.iter().flat_map(column))
-    }
-
     /// Whether the voltage is a copy of another column. The diagnosis reports a copy, so its unit
     /// is not checked.
     fn is_copied(&self) -> bool {
-        let all = |of: fn(&RigTrial) -> &[f64]| -> Vec<f64> {
-            self.trials.iter().flat_map(of).copied().collect()
-        };
-        let volts = all(|t| &t.bridge_v);
-        let others = [all(|t| &t.length_mm), all(|t| t.pressure_kpa.as_deref().unwrap_or(&[]))];
-        others.iter().any(|other| copied(other, &volts).is_some())
+        let volts = self.column(VOLTAGE);
+        [LENGTH, PRESSURE].iter().any(|other| copied(self.column(other), volts).is_some())
     }
 
     /// Whether a column with this range holds nothing but noise.
-    fn is_noise<'a>(&self, trials: impl Iterator<Item = &'a [f64]>, span: f64) -> bool {
-        span < NOISE_SPAN * noise_variance(trials, self.dt_s).sqrt()
+    fn is_noise(&self, column: &str, span: f64) -> bool {
+        let values = self.column(column);
+        let trials = self.columns.ranges.iter().map(|range| &values[range.clone()]);
+        span < NOISE_SPAN * noise_variance(trials, self.dt_s()).sqrt()
     }
 
     fn check_units(&self) -> Result<(), ProblemError> {
-        let length = self.range(|t| &t.length_mm);
-        let volts = self.range(|t| &t.bridge_v);
+        let range = |column: &str| ends(self.column(column));
+        let (length, volts) = (range(LENGTH), range(VOLTAGE));
         let bad =
             |column: &str, found: String, hint: &str| Err(ProblemError::value(column, found, hint));
         let spread = |(low, high): (f64, f64)| format!("values from {low} to {high}");
@@ -226,25 +161,24 @@ impl RigSession {
                 return Err(ProblemError::dead(column, format!("{} in every sample", range.0)));
             }
         }
-        let openings = (self.range(|t| &t.inlet), self.range(|t| &t.outlet));
-        for (column, range) in [("inlet", openings.0), ("outlet", openings.1)] {
+        let openings = VALVES.map(range);
+        for (column, range) in VALVES.into_iter().zip(openings) {
             if range.0 < 0.0 || range.1 > 1.0 {
                 return bad(column, spread(range), "an opening is a number from 0 to 1");
             }
         }
-        if openings.0.1 <= 0.0 && openings.1.1 <= 0.0 {
+        if openings.iter().all(|range| range.1 <= 0.0) {
             let hint = "no valve ever opens: check the columns inlet and outlet";
             return bad("inlet, outlet", "0 in every sample".into(), hint);
         }
-        if self.trials[0].pressure_kpa.is_some() {
-            let pressure = self.range(|t| t.pressure_kpa.as_deref().unwrap_or(&[]));
+        if self.columns.of(PRESSURE).is_some() {
+            let pressure = range(PRESSURE);
             if pressure.1 - pressure.0 <= 0.0 {
                 let hint = "the channel is dead: check the sensor, or take the column out";
                 return bad("pressure_kpa", format!("{} in every sample", pressure.0), hint);
             }
             // Noise alone does not show a unit; the diagnosis reports that the channel is dead.
-            let pressures = self.trials.iter().filter_map(|t| t.pressure_kpa.as_deref());
-            if self.is_noise(pressures, pressure.1 - pressure.0) {
+            if self.is_noise(PRESSURE, pressure.1 - pressure.0) {
                 return self.check_directions();
             }
             if pressure.1 > 10_000.0 {
@@ -289,37 +223,37 @@ impl RigSession {
             let (low, high) = ends(values);
             high - low
         };
+        let pressure = self.columns.of(PRESSURE);
+        let [[inlet, outlet], [length, volts]] =
+            [VALVES, [LENGTH, VOLTAGE]].map(|names| names.map(|name| self.column(name)));
         let (mut against, mut widest, mut stroke) = (0.0, 0.0_f64, 0.0_f64);
-        for trial in &self.trials {
-            let valves =
-                trial.inlet.iter().zip(&trial.outlet).map(|(inlet, outlet)| inlet - outlet);
-            for (open, pair) in valves.zip(trial.length_mm.windows(2)) {
+        let mut motions = Vec::new();
+        for (trial, range) in self.trials().iter().zip(&self.columns.ranges) {
+            let motion = Motion {
+                inlet: &inlet[range.clone()],
+                outlet: &outlet[range.clone()],
+                pressure_kpa: pressure.map(|values| &values[range.clone()]),
+                length_mm: &length[range.clone()],
+            };
+            let valves = motion.inlet.iter().zip(motion.outlet).map(|(i, o)| i - o);
+            for (open, pair) in valves.zip(motion.length_mm.windows(2)) {
                 against += open * (pair[1] - pair[0]);
                 widest = widest.max(open.abs());
             }
-            let moved = span(&trial.length_mm);
+            let moved = span(motion.length_mm);
             stroke = stroke.max(moved);
-            let others = [
-                ("bridge_v", Some(trial.bridge_v.as_slice())),
-                ("pressure_kpa", trial.pressure_kpa.as_deref()),
-            ];
+            let others = [(VOLTAGE, Some(&volts[range.clone()])), (PRESSURE, motion.pressure_kpa)];
             for (column, values) in others {
                 if let Some(values) = values.filter(|values| moved > 1.0 && span(values) <= 0.0) {
                     let found = format!("{} in every sample, while the muscle moves", values[0]);
                     return Err(ProblemError::dead(format!("{}, {column}", trial.name), found));
                 }
             }
+            motions.push(motion);
         }
         // Noise alone does not show a direction; the diagnosis reports that the channel is dead.
-        let lengths = self.trials.iter().map(|t| t.length_mm.as_slice());
-        if against > AGAINST * widest * stroke && !self.is_noise(lengths, stroke) {
-            let motions = self.trials.iter().map(|t| Motion {
-                inlet: &t.inlet,
-                outlet: &t.outlet,
-                pressure_kpa: t.pressure_kpa.as_deref(),
-                length_mm: &t.length_mm,
-            });
-            let (column, hint) = directions::against(&motions.collect::<Vec<_>>(), self.dt_s);
+        if against > AGAINST * widest * stroke && !self.is_noise(LENGTH, stroke) {
+            let (column, hint) = directions::against(&motions, self.dt_s());
             let found = "the muscle lengthens while the inlet is open";
             return Err(ProblemError::value(column, found, hint));
         }
@@ -342,102 +276,95 @@ pub(crate) enum Begin {
     Moving(f64, f64),
 }
 
-/// The smoothed measured inputs, and the state of the chamber at the start of every trial.
+/// What drives the stages: commands, smoothed measured inputs, and the state of the chamber at the start of every trial.
 #[derive(Debug, Clone)]
-pub(crate) struct Inputs {
-    pub(crate) length: Vec<Smoothed>,
-    pub(crate) length_draws: Draws,
-    pub(crate) pressure: Vec<Smoothed>,
-    pub(crate) pressure_draws: Draws,
-    pub(crate) begin: Vec<Begin>,
+pub(super) struct Inputs {
+    /// Inlet and outlet, all trials end to end.
+    pub(super) openings: [Vec<f64>; 2],
+    pub(super) length: MeasuredInput,
+    /// `None` if the pressure was not recorded.
+    pub(super) pressure: Option<MeasuredInput>,
+    pub(super) begin: Vec<Begin>,
     /// Shortest and longest length of the session, mm.
-    pub(crate) stroke: (f64, f64),
+    pub(super) stroke: (f64, f64),
 }
 
 impl Inputs {
-    pub(crate) fn of(
-        session: &RigSession,
-        length_sd: f64,
-        pressure_sd: f64,
+    /// The inputs of a recording; the noise of a `corrected` column is that of the channel divided by a factor.
+    pub(super) fn of(
+        columns: &Columns,
+        noises: &Noises,
+        corrected: Option<(&str, f64)>,
         supply_kpa: f64,
     ) -> Self {
-        let smooth = |trial: &RigTrial, record: &[f64], sd: f64, sharp: bool| {
-            let allowed = schedule(&trial.inlet, &trial.outlet, session.dt_s, sharp);
-            let smoothed = Smoothed::of(record, sd, &allowed);
-            match sharp && is_slow(session.dt_s) {
-                true => smoothed.cornered(switched(&trial.inlet, &trial.outlet)),
-                false => smoothed,
-            }
+        let divisor =
+            |name: &str| corrected.filter(|(own, _)| *own == name).map_or(1.0, |own| own.1);
+        let [inlet, outlet] = VALVES.map(|name| columns.all(name));
+        let smooth = |name: &str, noise: &Noise, is_sharp: bool| {
+            let (record, sd) = (columns.all(name), noise.sd() / divisor(name));
+            let one = |range: &Range<usize>| {
+                let [inlet, outlet] = [inlet, outlet].map(|valve| &valve[range.clone()]);
+                let allowed = schedule(inlet, outlet, columns.dt_s, is_sharp);
+                let smoothed = Smoothed::of(&record[range.clone()], sd, &allowed);
+                match is_sharp && is_slow(columns.dt_s) {
+                    true => smoothed.cornered(switched(inlet, outlet)),
+                    false => smoothed,
+                }
+            };
+            MeasuredInput::new(columns.ranges.iter().map(one).collect(), noise.clone())
         };
-        let trials = &session.trials;
-        let length: Vec<_> =
-            trials.iter().map(|t| smooth(t, &t.length_mm, length_sd, false)).collect();
-        let stroke = ends(length.iter().flat_map(|l| &l.values));
-        let pressure = trials
-            .iter()
-            .filter_map(|t| t.pressure_kpa.as_ref().map(|p| smooth(t, p, pressure_sd, true)))
+        let length = smooth(LENGTH, &noises.length_mm, false);
+        let has_pressure = columns.of(PRESSURE).is_some();
+        let pressure = has_pressure.then(|| smooth(PRESSURE, &noises.pressure_kpa, true));
+        let stroke = ends(&length.values());
+        let pressure_sd = noises.pressure_kpa.sd() / divisor(PRESSURE);
+        let begin = (0..columns.trials.len())
+            .map(|trial| begin(columns, trial, stroke, (pressure_sd, supply_kpa)))
             .collect();
-        let begin = trials
-            .iter()
-            .map(|t| Self::begin(t, session.dt_s, stroke, pressure_sd, supply_kpa))
-            .collect();
-        let [length_draws, pressure_draws] = [Draws::new(), Draws::new()];
-        Self { length, length_draws, pressure, pressure_draws, begin, stroke }
+        Self { openings: [inlet, outlet].map(<[f64]>::to_vec), length, pressure, begin, stroke }
     }
+}
 
-    fn begin(
-        trial: &RigTrial,
-        dt_s: f64,
-        stroke: (f64, f64),
-        pressure_sd: f64,
-        supply_kpa: f64,
-    ) -> Begin {
-        // The number of samples at rest at the trial's start, over at most a fifth of a second.
-        let longest = ((0.2 / dt_s) as usize).max(1);
-        let shut = trial.inlet.iter().zip(&trial.outlet).take_while(|(i, o)| **i + **o == 0.0);
-        let rest = shut.count().clamp(1, longest).min(trial.length_mm.len());
-        let mean = |x: &[f64]| x[..rest].iter().sum::<f64>() / rest as f64;
-        if let Some(pressure) = &trial.pressure_kpa {
-            let found = mean(pressure);
-            let sd = pressure_sd / (rest as f64).sqrt();
-            if found.abs() < 4.0 * sd + 2.0 {
-                return Begin::Empty;
-            }
-            if (found / supply_kpa - 1.0).abs() < 0.035 {
-                return Begin::Full;
-            }
-            return Begin::Pressure(found, sd);
+/// The state of the chamber at the start of a trial, from the standard deviation of the pressure and the supply, kPa.
+fn begin(
+    columns: &Columns,
+    trial: usize,
+    stroke: (f64, f64),
+    (pressure_sd, supply_kpa): (f64, f64),
+) -> Begin {
+    let own = |name: &str| &columns.all(name)[columns.ranges[trial].clone()];
+    let ([inlet, outlet], length) = (VALVES.map(own), own(LENGTH));
+    // The number of samples at rest at the trial's start, over at most a fifth of a second.
+    let longest = ((0.2 / columns.dt_s) as usize).max(1);
+    let shut = inlet.iter().zip(outlet).take_while(|(i, o)| **i + **o == 0.0);
+    let rest = shut.count().clamp(1, longest).min(length.len());
+    let mean = |x: &[f64]| x[..rest].iter().sum::<f64>() / rest as f64;
+    if columns.of(PRESSURE).is_some() {
+        let found = mean(own(PRESSURE));
+        let sd = pressure_sd / (rest as f64).sqrt();
+        if found.abs() < 4.0 * sd + 2.0 {
+            return Begin::Empty;
         }
-        if trial.goes_on {
-            let (mm, per_sample) = line(&trial.length_mm[..LINE.min(trial.length_mm.len())]);
-            return Begin::Moving(mm, per_sample / dt_s);
+        if (found / supply_kpa - 1.0).abs() < 0.035 {
+            return Begin::Full;
         }
-        let found = mean(&trial.length_mm);
-        let whole = stroke.1 - stroke.0;
-        if found > stroke.1 - 0.05 * whole {
-            Begin::Empty
-        } else if found < stroke.0 + 0.05 * whole {
-            Begin::Full
-        } else {
-            Begin::Length(found)
-        }
+        return Begin::Pressure(found, sd);
+    }
+    if columns.goes_on(trial) {
+        let first = || length.iter().take(LINE).enumerate().map(|(i, mm)| (i as f64, *mm));
+        let (mm, per_sample) = straight_line(first, 0.0);
+        return Begin::Moving(mm, per_sample / columns.dt_s);
+    }
+    let found = mean(length);
+    let whole = stroke.1 - stroke.0;
+    if found > stroke.1 - 0.05 * whole {
+        Begin::Empty
+    } else if found < stroke.0 + 0.05 * whole {
+        Begin::Full
+    } else {
+        Begin::Length(found)
     }
 }
 
 /// Number of samples at the beginning of a part from which its motion is estimated.
 const LINE: usize = 9;
-
-/// First value and slope (for each sample) of the straight line through values, by least squares.
-fn line(values: &[f64]) -> (f64, f64) {
-    let n = values.len() as f64;
-    let middle = 0.5 * (n - 1.0);
-    let mean = values.iter().sum::<f64>() / n;
-    let (mut along, mut square) = (0.0, 0.0);
-    for (i, x) in values.iter().enumerate() {
-        let t = i as f64 - middle;
-        along += t * x;
-        square += t * t;
-    }
-    let slope = if square > 0.0 { along / square } else { 0.0 };
-    (mean - slope * middle, slope)
-}

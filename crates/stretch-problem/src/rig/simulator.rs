@@ -4,15 +4,15 @@ use stretch_gap::{Description, Distortion, GapError, Line, Model, Run, Simulator
 use stretch_sim::RigStage;
 
 use super::{RigSimulator, run};
-use crate::bench::acting::lines;
+use crate::bench::smooth::MeasuredInput;
 
 impl Simulator for RigSimulator {
     fn description(&self) -> &Description {
-        &self.about
+        &self.bench.about
     }
 
     fn measured(&self, stage: usize) -> &[f64] {
-        &self.measured[stage]
+        self.bench.measured(stage)
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
@@ -20,12 +20,11 @@ impl Simulator for RigSimulator {
     }
 
     fn input(&self, stage: usize) -> Option<Vec<f64>> {
-        let smooth = match self.stage_kinds[stage] {
-            RigStage::Muscle => &self.inputs.pressure,
-            RigStage::Sensing => &self.inputs.length,
-            _ => return None,
-        };
-        Some(smooth.iter().flat_map(|s| &s.values).copied().collect())
+        match self.stage_kinds[stage] {
+            RigStage::Muscle => self.inputs.pressure.as_ref().map(MeasuredInput::values),
+            RigStage::Sensing => Some(self.inputs.length.values()),
+            _ => None,
+        }
     }
 
     fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
@@ -46,9 +45,6 @@ impl Simulator for RigSimulator {
     }
 
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
-        match self.stage_kinds[stage] {
-            RigStage::Sensing => lines(&self.effects, &self.rows, model, 1.0),
-            _ => Vec::new(),
-        }
+        if stage == self.bench.sensor { self.bench.lines(model) } else { Vec::new() }
     }
 }

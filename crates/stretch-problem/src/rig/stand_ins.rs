@@ -61,11 +61,11 @@ impl Setting<'_> {
     /// Simulated length without play in the reference, mm.
     fn free_length(&self, count: usize) -> Result<Arc<Vec<f64>>, ProblemError> {
         let effects = self.effects.only(|e| !e.hides_input());
-        let has_pressure = !self.rig.inputs.pressure.is_empty();
+        let has_pressure = self.rig.inputs.pressure.is_some();
         let grid = if has_pressure {
-            Grid::samples(self.rig.about.dt_s)?
+            Grid::samples(self.rig.bench.about.dt_s)?
         } else {
-            effects.grid(&self.params, self.rig.about.dt_s, self.step_s)?
+            effects.grid(&self.params, self.rig.bench.about.dt_s, self.step_s)?
         };
         let initial_share = self.initial_muscle;
         let without =
@@ -96,23 +96,19 @@ impl Setting<'_> {
 
     /// Number of samples in the first trials.
     fn samples(&self, count: usize) -> usize {
-        self.rig.about.trials[..count].iter().map(|t| t.samples).sum()
+        self.rig.bench.columns.ranges[..count].last().map_or(0, |range| range.end)
     }
 
     /// Pressure of the nominal pneumatics, kPa, for recordings without a pressure column.
     pub(super) fn simulated_pressure(&self, count: usize) -> Result<Arc<Pressures>, ProblemError> {
-        let effects = &self.rig.effects;
-        let grid = effects.grid(&self.params, self.rig.about.dt_s, self.step_s)?;
+        let effects = &self.rig.bench.effects;
+        let grid = effects.grid(&self.params, self.rig.bench.about.dt_s, self.step_s)?;
         let nominal = Setting { rig: self.rig, effects: effects.clone(), grid, ..*self };
         let make = || {
             let mut all = vec![0.0; self.samples(count)];
             nominal.pneumatics(count, &mut all)?;
-            let mut own = Vec::with_capacity(count);
-            self.each(count, &mut all, |_, values| {
-                own.push(values.to_vec());
-                Ok(())
-            })?;
-            Ok(own)
+            let ranges = self.rig.bench.columns.ranges[..count].iter();
+            Ok(ranges.map(|range| all[range.clone()].to_vec()).collect())
         };
         // If the chamber depends on the length, it depends on the draw of its noise and on a given
         // length.

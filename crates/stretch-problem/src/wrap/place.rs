@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeSet, ops::Range, sync::Arc};
 
-use stretch_data::{Quantity as Measured, ends, in_digits};
+use stretch_data::{Quantity as Measured, in_digits};
 use stretch_effects::{
     Beside, EffectParameter, Extent, Grid, KINDS, Kind, Quantity, Search, Side, Signals, Sketch,
     Span, Start,
@@ -11,8 +11,8 @@ use stretch_effects::{
 use stretch_gap::EffectSpec;
 
 use crate::{
-    bench::trials::session_s,
-    black_box::{StageEntry, begins::Before, columns::Columns},
+    bench::columns::Columns,
+    black_box::{StageEntry, begins::Before},
     error::ProblemError,
 };
 
@@ -187,8 +187,8 @@ fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
 
 fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
     let column = &site.column;
-    let values = among.columns.of(column).unwrap_or(&[]);
-    let trials = among.columns.ranges();
+    let values = among.columns.all(column);
+    let trials = &among.columns.ranges;
     // a step at the first sample counts as a change
     let begun = |range: Range<usize>| {
         let trial = trials.iter().position(|all| all.start == range.start);
@@ -199,10 +199,7 @@ fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
     let looked: Vec<Vec<f64>> = among.columns.looked_at().into_iter().map(begun).collect();
     let extent = Extent::of(looked.iter().map(Vec::as_slice), among.columns.dt_s);
     if extent.span() > 0.0 {
-        return Ok(Extent {
-            session_s: session_s(&among.columns.trials, among.columns.dt_s),
-            ..extent
-        });
+        return Ok(Extent { session_s: among.columns.session_s(), ..extent });
     }
     Err(ProblemError::value(
         format!("column {column}"),
@@ -214,8 +211,7 @@ fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
 /// The wrappers of a kind on a channel: one, or one for every other channel that the kind may depend on.
 fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Vec<Placed> {
     let own = &site.column;
-    let looked = among.columns.looked_at();
-    let range_of = |x: &[f64]| ends(looked.iter().flat_map(|r| &x[r.clone()])).into();
+    let range_of = |x: &[f64]| among.columns.range(x).into();
     let with = |beside: Option<&[f64]>, load: Option<(&[f64], &str)>| {
         let own = [extent.low, extent.high];
         let extent = Extent {

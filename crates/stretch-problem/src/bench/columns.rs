@@ -2,14 +2,11 @@
 
 use std::ops::Range;
 
-use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, Split};
-use stretch_gap::TrialSpec;
+use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, Split, ends};
+use stretch_gap::{RowsUsed, SampleRoles, TrialSpec};
 
-use super::spec::StageEntry;
-use crate::{
-    bench::trials::{column, looked_at, specs},
-    error::ProblemError,
-};
+use super::undetermined::{undetermined, undetermined_behind_gap};
+use crate::{black_box::StageEntry, error::ProblemError};
 
 /// Bounds of the least number of samples of a part of a trial. The least number is the number of samples in five
 /// seconds, limited to these bounds. Shorter parts are left out.
@@ -31,42 +28,101 @@ pub(crate) struct Columns {
     /// unwrapped.
     turns: Vec<Option<f64>>,
     pub(crate) trials: Vec<TrialSpec>,
+    /// Range of samples of every trial.
+    pub(crate) ranges: Vec<Range<usize>>,
     /// For each trial, the index of the recording that contains it.
-    sources: Vec<usize>,
+    pub(crate) sources: Vec<usize>,
     pub(crate) is_lost: Vec<bool>,
     pub(crate) dt_s: f64,
-    pub(crate) rows: Rows,
+    rows: Rows,
     pub(crate) notes: Vec<String>,
 }
 
 impl Columns {
-    pub(crate) fn read(trials: &[SessionTrial], names: Vec<String>) -> Result<Self, ProblemError> {
+    /// Brings columns of trials onto one even grid. Parts of fewer than `shortest` samples are left out.
+    pub(crate) fn even(
+        trials: &[SessionTrial],
+        names: Vec<String>,
+        shortest: usize,
+    ) -> Result<Self, ProblemError> {
         let asked: Vec<&str> = names.iter().map(String::as_str).collect();
-        let session = EvenSession::new(trials, &asked, shortest(trials))?;
+        let session = EvenSession::new(trials, &asked, shortest)?;
+        let each = || session.trials().iter();
+        let column = |at: usize| each().flat_map(|t| &t.columns()[at]).copied().collect();
+        let spec = |t: &EvenTrial| {
+            TrialSpec::new(t.name(), t.columns()[0].len(), t.start_s(), t.is_test())
+        };
+        let trials: Vec<TrialSpec> = each().map(spec).collect();
+        Ok(Self {
+            values: (0..names.len()).map(column).collect(),
+            names,
+            turns: session.turns().to_vec(),
+            ranges: TrialSpec::ranges(&trials),
+            trials,
+            sources: each().map(EvenTrial::source).collect(),
+            is_lost: each().flat_map(EvenTrial::is_lost).copied().collect(),
+            dt_s: session.dt_s(),
+            rows: session.rows(),
+            notes: session.notes().to_vec(),
+        })
+    }
+
+    /// Columns of a user's own simulator: as [`Columns::even`], with parts of five seconds or more, and at least one
+    /// trial that may be fitted.
+    pub(crate) fn read(trials: &[SessionTrial], names: Vec<String>) -> Result<Self, ProblemError> {
+        let columns = Self::even(trials, names, shortest(trials))?;
         if !trials.is_empty() && trials.iter().all(|t| t.split == Split::Test) {
             let hint = "give at least one trial that is not a test trial";
             return Err(ProblemError::too_little("no trial may be fitted", hint));
         }
-        if session.trials().is_empty() {
+        if columns.trials.is_empty() {
             return Err(ProblemError::value(
                 "recordings",
                 format!("no trial has {} samples in a row", shortest(trials)),
                 "record at least 10 s to fit and 5 s to test on, without gaps",
             ));
         }
-        let is_lost: Vec<bool> =
-            session.trials().iter().flat_map(|t| t.is_lost().iter().copied()).collect();
-        Ok(Self {
-            values: (0..names.len()).map(|at| column(&session, at)).collect(),
-            names,
-            turns: session.turns().to_vec(),
-            trials: specs(&session),
-            sources: session.trials().iter().map(EvenTrial::source).collect(),
-            is_lost: if is_lost.iter().any(|lost| *lost) { is_lost } else { Vec::new() },
-            dt_s: session.dt_s(),
-            rows: session.rows(),
-            notes: session.notes().to_vec(),
-        })
+        Ok(columns)
+    }
+
+    /// Marks the samples that gaps leave [`undetermined`] as lost, too. `by_motion` states whether a part behind a gap
+    /// depends on the motion before it.
+    pub(crate) fn mark_undetermined(&mut self, by_motion: bool) {
+        for (trial, range) in self.ranges.iter().enumerate() {
+            let is_lost = &self.is_lost[range.clone()];
+            let marked = match by_motion && self.goes_on(trial) {
+                true => undetermined_behind_gap(is_lost, self.dt_s),
+                false => undetermined(is_lost),
+            };
+            self.is_lost[range.clone()].copy_from_slice(&marked);
+        }
+    }
+
+    /// Whether a trial continues the trial before it after a gap.
+    pub(crate) fn goes_on(&self, trial: usize) -> bool {
+        trial.checked_sub(1).is_some_and(|before| self.sources[before] == self.sources[trial])
+    }
+
+    /// Numbers of rows that are used and that were read.
+    pub(crate) fn rows_used(&self) -> RowsUsed {
+        RowsUsed { used: self.rows.used(), read: self.rows.read }
+    }
+
+    /// Time from the first to the last sample of the session, s.
+    pub(crate) fn session_s(&self) -> f64 {
+        let end_s = |t: &TrialSpec| t.start_s + t.samples as f64 * self.dt_s;
+        let begun_s = self.trials.first().map_or(0.0, |t| t.start_s);
+        self.trials.last().map_or(0.0, end_s) - begun_s
+    }
+
+    /// The values of a column; none if there is no such column.
+    pub(crate) fn all(&self, name: &str) -> &[f64] {
+        self.of(name).unwrap_or(&[])
+    }
+
+    /// Smallest and largest of some values outside the test samples.
+    pub(crate) fn range(&self, values: &[f64]) -> (f64, f64) {
+        ends(self.looked_at().into_iter().flat_map(|range| &values[range]))
     }
 
     pub(crate) fn of(&self, name: &str) -> Option<&[f64]> {
@@ -88,7 +144,7 @@ impl Columns {
             values.iter_mut().for_each(|x| *x -= turns);
         };
         let index = |names: &[String], name: &String| names.iter().position(|n| n == name);
-        for range in self.ranges() {
+        for range in self.ranges.clone() {
             for (values, turn) in self.values.iter_mut().zip(&self.turns) {
                 turn.iter().for_each(|turn| shift(&mut values[range.clone()], 0.0, *turn));
             }
@@ -117,7 +173,7 @@ impl Columns {
             let Some(values) = self.of(name).filter(|_| self.turn_of(name).is_none()) else {
                 return false;
             };
-            let (low, high) = stretch_data::ends(values);
+            let (low, high) = ends(values);
             high - low <= 1.01 * turn && values.windows(2).any(|w| (w[1] - w[0]).abs() > 0.9 * turn)
         };
         let note = |name: &String| {
@@ -135,13 +191,14 @@ impl Columns {
         (0..self.sources.len()).filter(|trial| self.sources[*trial] >= first).collect()
     }
 
-    /// Range of samples of every trial.
-    pub(crate) fn ranges(&self) -> Vec<Range<usize>> {
-        TrialSpec::ranges(&self.trials)
+    /// Range of the samples of every trial outside the test samples; empty for a test trial.
+    pub(crate) fn fitted(&self) -> impl Iterator<Item = Range<usize>> {
+        let parts = self.ranges.iter().zip(SampleRoles::not_tested(&self.trials));
+        parts.map(|(all, fit)| all.start..all.start + fit)
     }
 
     /// Ranges of the samples outside the test samples.
     pub(crate) fn looked_at(&self) -> Vec<Range<usize>> {
-        looked_at(&self.trials)
+        self.fitted().filter(|range| !range.is_empty()).collect()
     }
 }

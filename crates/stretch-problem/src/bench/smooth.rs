@@ -4,7 +4,7 @@ use std::{convert::Infallible, num::NonZeroUsize};
 
 use stretch_gap::{Noise, RandomGenerator};
 
-use super::cache::LastResults;
+use crate::rig::cache::LastResults;
 
 /// Greatest half-width of a smoothing window, in samples.
 const WIDEST: usize = 15;
@@ -30,7 +30,7 @@ const PATIENCE: f64 = 4.0;
 #[derive(Debug, Clone)]
 pub(crate) struct Smoothed {
     halves: Vec<u8>,
-    pub(crate) values: Vec<f64>,
+    values: Vec<f64>,
     /// Samples before which the slope changed somewhere between two rows, and the change of the
     /// slope per sample.
     corners: Vec<(usize, f64)>,
@@ -198,29 +198,40 @@ fn middle_of(window: &[f64], h: usize) -> f64 {
 /// for the transmitted noise.
 const DRAWS: NonZeroUsize = NonZeroUsize::new(16).expect("not 0");
 
-/// Draws of the noise of a measured input; every model gets the same draws.
+/// A measured input of a stage, smoothed trial by trial, with its noise.
 #[derive(Debug, Clone)]
-pub(crate) struct Draws(LastResults<u64, Vec<Vec<f64>>>);
+pub(crate) struct MeasuredInput {
+    trials: Vec<Smoothed>,
+    noise: Noise,
+    /// Draws of the noise by seed; every model gets the same draws.
+    draws: LastResults<u64, Vec<Vec<f64>>>,
+}
 
-impl Draws {
-    pub(crate) fn new() -> Self {
-        Self(LastResults::new(DRAWS))
+impl MeasuredInput {
+    pub(crate) fn new(trials: Vec<Smoothed>, noise: Noise) -> Self {
+        Self { trials, noise, draws: LastResults::new(DRAWS) }
     }
 
-    /// A trial of an input with the draw of its noise that belongs to a seed.
-    pub(crate) fn with_noise(
-        &self,
-        inputs: &[Smoothed],
-        noise: &Noise,
-        seed: u64,
-        trial: usize,
-    ) -> Vec<f64> {
+    /// All trials end to end.
+    pub(crate) fn values(&self) -> Vec<f64> {
+        self.trials.iter().flat_map(|trial| &trial.values).copied().collect()
+    }
+
+    /// First value of a trial.
+    pub(crate) fn first(&self, trial: usize) -> Option<f64> {
+        self.trials[trial].values.first().copied()
+    }
+
+    /// A trial, with the draw of its noise that belongs to a seed if there is one.
+    pub(crate) fn trial(&self, trial: usize, seed: Option<u64>) -> Vec<f64> {
+        let values = &self.trials[trial].values;
+        let Some(seed) = seed else { return values.clone() };
         let draw = |(i, input): (usize, &Smoothed)| {
-            input.drawn(noise, &mut RandomGenerator::new(seed, i as u64))
+            input.drawn(&self.noise, &mut RandomGenerator::new(seed, i as u64))
         };
-        let all = || Ok::<_, Infallible>(inputs.iter().enumerate().map(draw).collect());
-        let Ok(drawn) = self.0.or_make(seed, all);
-        inputs[trial].values.iter().zip(&drawn[trial]).map(|(x, n)| x + n).collect()
+        let all = || Ok::<_, Infallible>(self.trials.iter().enumerate().map(draw).collect());
+        let Ok(drawn) = self.draws.or_make(seed, all);
+        values.iter().zip(&drawn[trial]).map(|(x, n)| x + n).collect()
     }
 }
 
@@ -231,7 +242,7 @@ pub(crate) fn unscheduled(samples: usize) -> Vec<u8> {
 
 /// Value a share of the way from sample `i` to the next, on a cubic through four samples (Catmull and Rom 1974); the
 /// first and last value are held.
-pub(super) fn cubic(samples: &[f64], i: usize, share: f64) -> f64 {
+pub(crate) fn cubic(samples: &[f64], i: usize, share: f64) -> f64 {
     let at = |i: usize| samples[i.min(samples.len() - 1)];
     let (a, b, c, d) = (at(i.saturating_sub(1)), at(i), at(i + 1), at(i + 2));
     let t = share;

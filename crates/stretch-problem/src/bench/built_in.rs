@@ -1,0 +1,119 @@
+//! Results of a diagnosis of a built-in simulator: notes, the next experiment, code for effects, and the fixed rig
+//! file.
+
+use std::fmt::Debug;
+
+use stretch_data::{Remarks, RigFile};
+use stretch_gap::{Diagnosis, Evidence, GapError, Laboratory, Model, Proposal, next_experiment};
+use stretch_sim::{Effect, EffectSet, Grid, Surroundings};
+
+use super::Bench;
+use crate::{
+    fix::{Chosen, Fix, Fixed, NoFix, names, with_line},
+    implement::Implementation,
+    problem::Diagnosable,
+};
+
+/// What a whole rig and a gauge alone do differently with the results of a diagnosis.
+pub(crate) trait BuiltIn: Laboratory {
+    /// The recording and the effects.
+    fn bench(&self) -> &Bench;
+
+    /// The surroundings of an effect in the simulator, re-tuned as in a model.
+    fn surroundings<'a>(&self, model: &Model, grid: &'a Grid) -> Surroundings<'a>;
+
+    /// Size of a spectral line of unit amplitude in the sensor's signal.
+    fn line_unit(&self, model: &Model) -> f64;
+
+    /// Values of an effect within the limits of a file, because rounding may put a value outside of its range.
+    fn within(_: &Effect, values: &[f64]) -> Vec<f64> {
+        values.to_vec()
+    }
+
+    /// The file of the simulator with re-tuned parameters and with `effects`. It adds the comments on parameters, and
+    /// omits the parameters of the recording.
+    ///
+    /// # Errors
+    /// A file that could not be read again.
+    fn file(
+        &self,
+        chosen: &Chosen<'_>,
+        effects: EffectSet,
+        remarks: &mut Remarks,
+    ) -> Result<RigFile, NoFix>;
+
+    /// Notes that are known only after the diagnosis, in sentences.
+    fn afterwards(&self) -> Vec<String> {
+        Vec::new()
+    }
+}
+
+/// Values of an effect with the amplitude and phase of its spectral line from the recording.
+fn complete<B: BuiltIn>(own: &B, model: &Model, effect: &Effect, values: Vec<f64>) -> Vec<f64> {
+    let Bench { sensor, rows, .. } = own.bench();
+    with_line(own, (*sensor, own.line_unit(model)), rows, model, (effect, values))
+}
+
+impl<B: BuiltIn + Debug + Send> Diagnosable for B {
+    fn notes(&self) -> Vec<String> {
+        self.bench().columns.notes.clone()
+    }
+
+    fn afterwards(&self) -> Vec<String> {
+        BuiltIn::afterwards(self)
+    }
+
+    fn next(
+        &self,
+        diagnosis: &Diagnosis,
+        evidence: &Evidence,
+    ) -> Result<Option<Proposal>, GapError> {
+        next_experiment(self, diagnosis, evidence)
+    }
+
+    /// Code for the effects that a diagnosis names, with the fitted numbers, in the re-tuned simulator.
+    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
+        let Bench { about, rows, .. } = self.bench();
+        let Ok(chosen) = Chosen::of(diagnosis, evidence) else { return Vec::new() };
+        // The sample time is valid, because a diagnosis ran with it.
+        let Ok(grid) = Grid::samples(about.dt_s) else { return Vec::new() };
+        let model = evidence.candidates.first().unwrap_or(&evidence.best);
+        let around = self.surroundings(model, &grid);
+        let one = |(index, values): (usize, &[f64])| {
+            let effect = rows[index];
+            Implementation {
+                name: effect.name.to_owned(),
+                words: effect.words.to_owned(),
+                stage: effect.stage.name().to_owned(),
+                formula: effect.equation.to_owned(),
+                numbers: chosen.numbers(effect.name),
+                sketch: effect.sketch(&complete(self, model, effect, values.to_vec()), &around),
+            }
+        };
+        chosen.named(&about.effects).into_iter().map(one).collect()
+    }
+
+    /// A rig file with the findings of a diagnosis: see [`Fix`]. A diagnosis of the same recording with this file gives
+    /// `no_gap`.
+    ///
+    /// A diagnosis does not fit a hum's amplitude and phase, so the file has values that are estimated from the fit
+    /// trials, on the session's clock.
+    fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
+        let Bench { about, rows, effects, .. } = self.bench();
+        let chosen = Chosen::of(diagnosis, evidence)?;
+        let mut remarks = Remarks { head: chosen.head(), ..Remarks::default() };
+        for effect in effects.iter() {
+            let own = vec!["This effect was in the rig file already.".to_owned()];
+            remarks.effects.insert(effect.name().into(), own);
+        }
+        let mut effects = effects.clone();
+        for (index, values) in chosen.effects(&about.effects) {
+            let effect = rows[index];
+            let values = complete(self, chosen.model, effect, Self::within(effect, values));
+            chosen.describe(effect.into(), &mut remarks);
+            effects.push(effect, &values)?;
+        }
+        let file = self.file(&chosen, effects, &mut remarks)?;
+        Ok(Fix { effects: names(&file), file: Fixed::Rig(file), remarks })
+    }
+}

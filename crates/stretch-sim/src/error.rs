@@ -1,5 +1,7 @@
 //! Errors of a rig, its effects or its inputs.
 
+use std::ops::RangeInclusive;
+
 use stretch_effects::Effect;
 
 /// Why a rig, an effect or an input was refused, with the offending values.
@@ -14,156 +16,9 @@ pub enum SimError {
         /// The nearest name of the catalogue, when one is near.
         nearest: Option<String>,
     },
-    /// A parameter of that name is not known there.
-    #[error("`{owner}` has no parameter `{name}`{}", suggestion(.nearest))]
-    UnknownParameter {
-        /// The effect, table or file it was given to.
-        owner: String,
-        /// The name that was given.
-        name: String,
-        /// The nearest name, when one is near.
-        nearest: Option<String>,
-    },
-    /// A rig file has a table that this kind of rig does not have.
-    #[error("a rig file of {rig} has no table `{name}`{}", suggestion(.nearest))]
-    UnknownTable {
-        /// The kind of rig.
-        rig: &'static str,
-        /// The table.
-        name: String,
-        /// The nearest table, when one is near.
-        nearest: Option<String>,
-    },
-    /// A rig file describes another kind of rig.
-    #[error("the rig file is of kind `{found}`; give a rig file {needed}")]
-    Kind {
-        /// The kind in the file.
-        found: String,
-        /// The kind that is needed.
-        needed: &'static str,
-    },
-    /// A value outside its plausible range.
-    #[error("`{owner}`: {name} = {value} is outside {min} .. {max}{}", shown(.unit))]
-    OutOfRange {
-        /// The effect or table.
-        owner: String,
-        /// The parameter.
-        name: String,
-        /// The value that was given.
-        value: f64,
-        /// Smallest allowed value.
-        min: f64,
-        /// Largest allowed value.
-        max: f64,
-        /// Unit of value, minimum and maximum.
-        unit: String,
-    },
-    /// A required parameter is missing.
-    #[error("`{owner}` lacks the parameter `{name}`")]
-    MissingParameter {
-        /// The effect or table.
-        owner: String,
-        /// The parameter.
-        name: String,
-    },
-    /// A parameter that must be positive (or not negative) is not.
-    #[error("`{owner}`: {name} = {value} must be {needs}")]
-    BadParameter {
-        /// The table.
-        owner: String,
-        /// The parameter.
-        name: String,
-        /// The value that was given.
-        value: f64,
-        /// The condition that the value must meet.
-        needs: &'static str,
-    },
-    /// The same effect was given twice.
-    #[error("effect `{name}` is given twice")]
-    RepeatedEffect {
-        /// Name of the effect.
-        name: String,
-    },
-    /// The effect does not act in this kind of rig.
-    #[error("effect `{name}` needs {needs}, which this rig does not have")]
-    NotHere {
-        /// Name of the effect.
-        name: String,
-        /// The equipment that the effect needs.
-        needs: &'static str,
-    },
-    /// The sleeve would be slack within the stroke, so the bridge would not respond.
-    #[error(
-        "the sleeve goes slack: the gauge strain at full contraction is {strain}, but at least {least} is needed; check the geometry in the rig file"
-    )]
-    SlackSleeve {
-        /// Strain at the supply pressure.
-        strain: f64,
-        /// Smallest allowed strain.
-        least: f64,
-    },
-    /// An opening outside 0..1, or not a number.
-    #[error("{column}, sample {sample}: opening {value} is outside 0 .. 1")]
-    Opening {
-        /// `inlet` or `outlet`.
-        column: &'static str,
-        /// Which sample, from 0.
-        sample: usize,
-        /// The opening.
-        value: f64,
-    },
-    /// Time does not advance uniformly.
-    #[error("sample {sample}: time advances by {found} s, but the trial's step is {expected} s")]
-    NotUniform {
-        /// Which sample, from 0.
-        sample: usize,
-        /// The step of the trial.
-        expected: f64,
-        /// The step found.
-        found: f64,
-    },
-    /// A grid that is not split where the valves switch.
-    #[error(
-        "the time grid was made for a valve delay of {found} s, but the effects have a delay of {expected} s"
-    )]
-    GridDelay {
-        /// Delay of the effects, s.
-        expected: f64,
-        /// Delay of the grid, s.
-        found: f64,
-    },
-    /// A required column is missing.
-    #[error("the trial has no column `{name}`")]
-    MissingColumn {
-        /// The column.
-        name: &'static str,
-    },
-    /// A column requests something impossible.
-    #[error("column {name}: {problem}")]
-    Column {
-        /// The column.
-        name: String,
-        /// The problem, and the values that would be valid.
-        problem: String,
-    },
-    /// Slices that must have the same (or a derived) length do not.
-    #[error("`{name}` has {found} values, but {expected} are needed")]
-    Length {
-        /// Name of the slice.
-        name: &'static str,
-        /// Values needed.
-        expected: usize,
-        /// Values found.
-        found: usize,
-    },
-    /// A number that has to be finite and positive is not.
-    #[error("{name} = {value} must be finite and positive")]
-    NotPositive {
-        /// Name of the number.
-        name: &'static str,
-        /// The number.
-        value: f64,
-    },
+    /// A rig file, an effect, a trial or a number was refused. The message names the value and what is needed.
+    #[error("{0}")]
+    Refused(String),
 }
 
 /// Returns the words that offer a suggestion; empty without one.
@@ -177,11 +32,6 @@ fn or_list(nearest: &Option<String>) -> String {
         Some(_) => suggestion(nearest),
         None => "; `stretch effects` lists the names".to_owned(),
     }
-}
-
-/// Returns a space and the unit; empty for the unit 1.
-fn shown(unit: &str) -> String {
-    if unit == "1" { String::new() } else { format!(" {unit}") }
 }
 
 /// The candidate that was probably meant.
@@ -201,12 +51,65 @@ impl SimError {
 
     /// Returns the error for a name that its owner does not know.
     pub(crate) fn unknown_parameter(owner: &str, name: &str, nearest: Option<String>) -> Self {
-        Self::UnknownParameter { owner: owner.to_owned(), name: name.to_owned(), nearest }
+        let suggestion = suggestion(&nearest);
+        Self::Refused(format!("`{owner}` has no parameter `{name}`{suggestion}"))
+    }
+
+    /// Returns the error for a table that a rig file of this kind does not have.
+    pub(crate) fn unknown_table(rig: &str, name: &str, nearest: Option<String>) -> Self {
+        let suggestion = suggestion(&nearest);
+        Self::Refused(format!("a rig file of {rig} has no table `{name}`{suggestion}"))
+    }
+
+    /// Returns the error for a rig file that describes another kind of rig.
+    pub(crate) fn kind(found: &str, needed: &str) -> Self {
+        Self::Refused(format!("the rig file is of kind `{found}`; give a rig file {needed}"))
+    }
+
+    /// Returns the error for a value outside of its limits; `unit` is that of the value and of the limits.
+    pub(crate) fn out_of_range(
+        (owner, name, unit): (&str, &str, &str),
+        value: f64,
+        limits: &RangeInclusive<f64>,
+    ) -> Self {
+        let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+        let (min, max) = (limits.start(), limits.end());
+        Self::Refused(format!("`{owner}`: {name} = {value} is outside {min} .. {max}{unit}"))
+    }
+
+    /// Returns the error for a required parameter that is missing.
+    pub(crate) fn missing_parameter(owner: &str, name: &str) -> Self {
+        Self::Refused(format!("`{owner}` lacks the parameter `{name}`"))
+    }
+
+    /// Returns the error for a parameter that does not meet a condition.
+    pub(crate) fn bad_parameter(owner: &str, name: &str, value: f64, needs: &str) -> Self {
+        Self::Refused(format!("`{owner}`: {name} = {value} must be {needs}"))
+    }
+
+    /// Returns the error for an effect that was given twice.
+    pub(crate) fn repeated_effect(name: &str) -> Self {
+        Self::Refused(format!("effect `{name}` is given twice"))
+    }
+
+    /// Returns the error for an effect that does not act in this kind of rig.
+    pub(crate) fn not_here(name: &str, needs: &str) -> Self {
+        Self::Refused(format!("effect `{name}` needs {needs}, which this rig does not have"))
+    }
+
+    /// Returns the error for a column that requests something impossible.
+    pub(crate) fn column(name: &str, problem: &str) -> Self {
+        Self::Refused(format!("column {name}: {problem}"))
+    }
+
+    /// Returns the error for a number that has to be finite and positive.
+    pub(crate) fn not_positive(name: &str, value: f64) -> Self {
+        Self::Refused(format!("{name} = {value} must be finite and positive"))
     }
 }
 
 impl From<stretch_effects::GridError> for SimError {
     fn from(error: stretch_effects::GridError) -> Self {
-        Self::NotPositive { name: error.name, value: error.value }
+        Self::not_positive(error.name, error.value)
     }
 }

@@ -87,7 +87,7 @@ impl Gauge {
     pub fn new(spec: GaugeSpec, effects: &EffectSet, dt_s: f64) -> Result<Self, SimError> {
         for (name, value) in [("span of the reference", spec.span), ("gain", spec.gain.abs())] {
             if !(value.is_finite() && value > 0.0) {
-                return Err(SimError::NotPositive { name, value });
+                return Err(SimError::not_positive(name, value));
             }
         }
         let on = |e: &&ActiveEffect| !e.is_off();
@@ -97,7 +97,7 @@ impl Gauge {
             .find(|e| !Self::accepts(e.effect(), spec.pressure_scale.is_some()))
         {
             let needs = e.effect().needs.map_or("valves and a muscle", Need::words);
-            return Err(SimError::NotHere { name: e.name().to_string(), needs });
+            return Err(SimError::not_here(e.name(), needs));
         }
         let grid = Grid::samples(dt_s)?;
         let around = Self::surroundings(&spec, &grid);
@@ -239,12 +239,10 @@ impl GaugeRig {
         let unknown = SimError::unknown_parameter;
         let kind = file.kind.as_deref().unwrap_or("rig");
         if kind != KIND {
-            let needed = "of a gauge alone, with kind = \"gauge\"";
-            return Err(SimError::Kind { found: kind.to_owned(), needed });
+            return Err(SimError::kind(kind, "of a gauge alone, with kind = \"gauge\""));
         }
         if let Some(table) = file.stages.keys().find(|table| *table != TABLE) {
-            let (rig, nearest) = ("a gauge alone", Some(TABLE.to_owned()));
-            return Err(SimError::UnknownTable { rig, name: table.clone(), nearest });
+            return Err(SimError::unknown_table("a gauge alone", table, Some(TABLE.to_owned())));
         }
         let empty = BTreeMap::new();
         let table = file.stages.get(TABLE).unwrap_or(&empty);
@@ -253,9 +251,8 @@ impl GaugeRig {
             return Err(unknown(TABLE, name, nearest(name, known())));
         }
         let value = |name: &str| {
-            table.get(name).map(|parameter| parameter.value).ok_or_else(|| {
-                SimError::MissingParameter { owner: TABLE.to_owned(), name: name.to_owned() }
-            })
+            let value = table.get(name).map(|parameter| parameter.value);
+            value.ok_or_else(|| SimError::missing_parameter(TABLE, name))
         };
         let spec = GaugeSpec {
             zero: value("zero")?,

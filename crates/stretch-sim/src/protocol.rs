@@ -2,7 +2,7 @@
 
 use stretch_data::{Channel, Split, Trial, TrialKind};
 
-use crate::{Key, RigParams, SimError, StaticLaw, random::Random};
+use crate::{Key, RigParams, SimError, StaticLaw, random::Random, stages::check_length};
 
 /// Samples per second of every protocol of the paper.
 pub const RATE_HZ: f64 = 100.0;
@@ -196,13 +196,13 @@ impl TrialPlan {
     pub fn from_trial(trial: &Trial, rig: &RigParams) -> Result<Self, SimError> {
         check_columns(trial)?;
         check_lengths(trial)?;
-        let column =
-            |name: &'static str| trial.channel(name).ok_or(SimError::MissingColumn { name });
+        let missing = |name: &str| SimError::Refused(format!("the trial has no column `{name}`"));
+        let column = |name: &str| trial.channel(name).ok_or_else(|| missing(name));
         let (inlet, outlet) = (column("inlet")?.to_vec(), column("outlet")?.to_vec());
         crate::Openings { inlet: &inlet, outlet: &outlet }.check()?;
         let time = &trial.time_s;
         if time.len() < 2 {
-            return Err(SimError::Length { name: "time_s", expected: 2, found: time.len() });
+            check_length("time_s", 2, time.len())?;
         }
         let mut steps: Vec<f64> = time.windows(2).map(|t| t[1] - t[0]).collect();
         steps.sort_by(f64::total_cmp);
@@ -211,11 +211,10 @@ impl TrialPlan {
         // Times are written with a few decimals. A deviation of up to a hundredth of a step is rounding, a larger one
         // is a gap.
         if let Some(i) = time.windows(2).position(|t| !even(t[1] - t[0])) {
-            return Err(SimError::NotUniform {
-                sample: i + 1,
-                expected,
-                found: time[i + 1] - time[i],
-            });
+            let (sample, found) = (i + 1, time[i + 1] - time[i]);
+            return Err(SimError::Refused(format!(
+                "sample {sample}: time advances by {found} s, but the trial's step is {expected} s"
+            )));
         }
         // The mean rate, rounded to a whole number if rounding of the times explains the
         // difference.
@@ -265,10 +264,10 @@ fn check_lengths(trial: &Trial) -> Result<(), SimError> {
     let expected = trial.len();
     match trial.channels.iter().find(|channel| channel.values.len() != expected) {
         None => Ok(()),
-        Some(Channel { name, values }) => Err(SimError::Column {
-            name: name.clone(),
-            problem: format!("it has {} values for {expected} samples", values.len()),
-        }),
+        Some(Channel { name, values }) => Err(SimError::column(
+            name,
+            &format!("it has {} values for {expected} samples", values.len()),
+        )),
     }
 }
 
@@ -279,13 +278,13 @@ fn check_columns(trial: &Trial) -> Result<(), SimError> {
     let other = trial.channels.iter().find(|c| asks(&c.name) && !known.contains(&c.name.as_str()));
     match other {
         None => Ok(()),
-        Some(other) => Err(SimError::Column {
-            name: other.name.clone(),
-            problem: format!(
+        Some(other) => Err(SimError::column(
+            &other.name,
+            &format!(
                 "the simulated rig does not know this command; except for inlet and outlet, it takes only {}",
                 known.join(", ")
             ),
-        }),
+        )),
     }
 }
 
@@ -295,19 +294,19 @@ fn excitation(trial: &Trial) -> Result<f64, SimError> {
     let share = shares.first().copied().unwrap_or(1.0);
     match shares.iter().find(|s| **s != share || !(**s > 0.0 && **s <= 2.0)) {
         None => Ok(share),
-        Some(other) => Err(SimError::Column {
-            name: EXCITATION.to_owned(),
-            problem: format!(
+        Some(other) => Err(SimError::column(
+            EXCITATION,
+            &format!(
                 "it contains {other}, and {share} in the first row; it must be the same number in every row, above 0 and at most 2"
             ),
-        }),
+        )),
     }
 }
 
 /// Shares of a shunt, if there is one.
 fn shunt(trial: &Trial) -> Result<Option<Vec<f64>>, SimError> {
     let Some(shares) = trial.channel(SHUNT) else { return Ok(None) };
-    let fail = |problem: String| Err(SimError::Column { name: SHUNT.to_owned(), problem });
+    let fail = |problem: String| Err(SimError::column(SHUNT, &problem));
     if let Some(share) = shares.iter().find(|s| !(0.0..1.0).contains(*s)) {
         return fail(format!("{share} is outside 0 .. 1"));
     }

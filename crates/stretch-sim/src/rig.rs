@@ -10,7 +10,7 @@ use crate::{
     Bridge, SimError, StaticLaw,
     effects::EffectSet,
     error::nearest,
-    params::{Key, PARAMETERS, RigParams, Tolerance},
+    params::{Key, PARAMETERS, ParameterInfo, RigParams, Tolerance},
     random::Random,
 };
 
@@ -90,8 +90,7 @@ impl Rig {
     /// "gauge"`).
     pub fn from_file(file: &RigFile) -> Result<Self, SimError> {
         if let Some(kind) = file.kind.as_ref().filter(|kind| *kind != "rig") {
-            let needed = "of a whole rig, without the key kind";
-            return Err(SimError::Kind { found: kind.clone(), needed });
+            return Err(SimError::kind(kind, "of a whole rig, without the key kind"));
         }
         let mut rig = Self::default();
         let tables =
@@ -99,8 +98,7 @@ impl Rig {
         for (table, parameters) in file.stages.iter().filter(|(name, _)| *name != SIMULATION) {
             if !tables.iter().any(|stage| stage.name() == table) {
                 let nearest = nearest(table, tables.iter().map(|s| s.name()));
-                let (rig, name) = ("a whole rig", table.clone());
-                return Err(SimError::UnknownTable { rig, name, nearest });
+                return Err(SimError::unknown_table("a whole rig", table, nearest));
             }
             for (name, parameter) in parameters {
                 let known = PARAMETERS.iter().find(|p| p.name == name && p.stage.name() == table);
@@ -122,28 +120,22 @@ impl Rig {
     /// Checks that every parameter is within its physical limits.
     ///
     /// # Errors
-    /// The first parameter that is not, or [`SimError::SlackSleeve`].
+    /// The first parameter that is not, or a sleeve that would be slack within the stroke, so that the bridge would not
+    /// respond.
     pub fn check(&self) -> Result<(), SimError> {
+        let bad = |info: &ParameterInfo, needs| {
+            let (owner, value) = (info.stage.name(), self.params[info.key]);
+            Err(SimError::bad_parameter(owner, info.name, value, needs))
+        };
         for info in &PARAMETERS {
             let value = self.params[info.key];
             let allowed = value > 0.0 || (info.zero_allowed && value == 0.0);
             if !(value.is_finite() && allowed) {
-                return Err(SimError::BadParameter {
-                    owner: info.stage.name().into(),
-                    name: info.name.into(),
-                    value,
-                    needs: if info.zero_allowed { "zero or positive" } else { "positive" },
-                });
+                return bad(info, if info.zero_allowed { "zero or positive" } else { "positive" });
             }
         }
-        let bits = self.params[Key::Bits];
-        if bits.fract() != 0.0 {
-            return Err(SimError::BadParameter {
-                owner: Key::Bits.info().stage.name().into(),
-                name: Key::Bits.info().name.into(),
-                value: bits,
-                needs: "a whole number",
-            });
+        if self.params[Key::Bits].fract() != 0.0 {
+            return bad(Key::Bits.info(), "a whole number");
         }
         for (key, min, max) in [
             (Key::B, 0.0, 0.95),
@@ -153,19 +145,17 @@ impl Rig {
         ] {
             let value = self.params[key];
             if !(min..=max).contains(&value) {
-                return Err(SimError::OutOfRange {
-                    owner: key.info().stage.name().into(),
-                    name: key.info().name.into(),
-                    value,
-                    min,
-                    max,
-                    unit: key.info().unit.into(),
-                });
+                let ParameterInfo { stage, name, unit, .. } = key.info();
+                let owner = (stage.name(), *name, *unit);
+                return Err(SimError::out_of_range(owner, value, &(min..=max)));
             }
         }
         let strain = self.least_strain();
         if strain.is_nan() || strain <= LEAST_STRAIN {
-            return Err(SimError::SlackSleeve { strain, least: LEAST_STRAIN });
+            return Err(SimError::Refused(format!(
+                "the sleeve goes slack: the gauge strain at full contraction is {strain}, but at least {LEAST_STRAIN} is needed; check \
+                 the geometry in the rig file"
+            )));
         }
         Ok(())
     }
@@ -231,17 +221,9 @@ impl RunSettings {
         let mut settings = Self::default();
         for (name, parameter) in table {
             let value = parameter.value;
-            let check = |holds: bool, needs: &'static str| {
-                if holds {
-                    Ok(())
-                } else {
-                    Err(SimError::BadParameter {
-                        owner: SIMULATION.into(),
-                        name: name.clone(),
-                        value,
-                        needs,
-                    })
-                }
+            let check = |holds: bool, needs: &str| match holds {
+                true => Ok(()),
+                false => Err(SimError::bad_parameter(SIMULATION, name, value, needs)),
             };
             match name.as_str() {
                 "seed" => {

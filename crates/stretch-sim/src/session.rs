@@ -51,10 +51,7 @@ impl Session {
     pub fn new(rig: &Rig, settings: &RunSettings) -> Result<Self, SimError> {
         rig.check()?;
         if !(settings.step_s.is_finite() && settings.step_s > 0.0) {
-            return Err(SimError::NotPositive {
-                name: "step of integration",
-                value: settings.step_s,
-            });
+            return Err(SimError::not_positive("step of integration", settings.step_s));
         }
         Ok(Self {
             rig: rig.clone(),
@@ -76,7 +73,7 @@ impl Session {
         let openings = Openings { inlet: &plan.inlet, outlet: &plan.outlet };
         let samples = openings.check()?;
         if !(plan.rate_hz.is_finite() && plan.rate_hz > 0.0) {
-            return Err(SimError::NotPositive { name: "rate", value: plan.rate_hz });
+            return Err(SimError::not_positive("rate", plan.rate_hz));
         }
         let (start_s, pause_s) = self.clock(plan)?;
         let wanted = [plan.rate_hz, plan.excitation];
@@ -150,7 +147,7 @@ impl Session {
         let start_s = plan.start_s.unwrap_or(usual);
         let pause_s = if self.trials == 0 { PAUSE_S } else { rounded(start_s - self.end_s) };
         if !(start_s.is_finite() && pause_s >= 0.0) {
-            return Err(SimError::NotPositive { name: "pause before a trial, s", value: pause_s });
+            return Err(SimError::not_positive("pause before a trial, s", pause_s));
         }
         Ok((start_s, pause_s))
     }
@@ -185,12 +182,10 @@ impl Session {
         }
         let samples = pause_s * plan.rate_hz;
         if samples > MOST_PAUSE {
-            return Err(SimError::Column {
-                name: "start_s".into(),
-                problem: format!(
-                    "the pause before this trial, {pause_s} s, has {samples} samples; at most {MOST_PAUSE} are simulated"
-                ),
-            });
+            let problem = format!(
+                "the pause before this trial, {pause_s} s, has {samples} samples; at most {MOST_PAUSE} are simulated"
+            );
+            return Err(SimError::column("start_s", &problem));
         }
         let samples = samples.ceil() as usize + 1;
         let (open, shut) = (vec![1.0; samples], vec![0.0; samples]);

@@ -73,7 +73,7 @@ impl Catalogue {
     /// An effect with that name exists.
     pub fn with(mut self, effect: &'static Effect) -> Result<Self, SimError> {
         if self.named(effect.name).is_some() {
-            return Err(SimError::RepeatedEffect { name: effect.name.to_owned() });
+            return Err(SimError::repeated_effect(effect.name));
         }
         self.effects.push(effect);
         Ok(self)

@@ -4,7 +4,7 @@ use stretch_data::EffectEntry;
 use stretch_effects::{Action, Effect, EffectParameter, Grid, RigStage, Role, Surroundings};
 
 use super::{CATALOGUE, effect_named};
-use crate::{SimError, error::nearest, params::RigParams};
+use crate::{SimError, error::nearest, params::RigParams, stages::check_length};
 
 /// One effect with the values of its parameters, in the order of [`Effect`]'s parameters.
 #[derive(Debug, Clone)]
@@ -134,13 +134,13 @@ impl EffectSet {
     pub fn push(&mut self, effect: &'static Effect, values: &[f64]) -> Result<(), SimError> {
         let name = effect.name;
         if self.find(name).is_some() {
-            return Err(SimError::RepeatedEffect { name: name.to_string() });
+            return Err(SimError::repeated_effect(name));
         }
         let (expected, found) = (effect.parameters.len(), values.len());
         let left_out = effect.parameters.get(found..).unwrap_or(&[]);
         let is_needed = |p: &EffectParameter| matches!(p.role, Role::Strength { .. } | Role::Shape);
         if found > expected || left_out.iter().any(is_needed) {
-            return Err(SimError::Length { name, expected, found });
+            check_length(name, expected, found)?;
         }
         let mut values = values.to_vec();
         values.extend(left_out.iter().map(|p| p.typical));
@@ -219,15 +219,7 @@ fn known(name: &str) -> Result<&'static Effect, SimError> {
 }
 
 fn out_of_range(effect: &Effect, p: &EffectParameter, value: f64) -> SimError {
-    let allowed = p.allowed();
-    SimError::OutOfRange {
-        owner: effect.name.to_string(),
-        name: p.name.to_string(),
-        value,
-        min: *allowed.start(),
-        max: *allowed.end(),
-        unit: p.unit.to_string(),
-    }
+    SimError::out_of_range((effect.name, &p.name, &p.unit), value, &p.allowed())
 }
 
 /// Names and values of a rig file's entry.
@@ -254,10 +246,7 @@ fn resolve(
     let any =
         parameters.iter().filter(strengths).any(|p| given.iter().any(|(name, _)| *name == p.name));
     if let (false, Some(missing)) = (any, parameters.iter().find(strengths)) {
-        return Err(SimError::MissingParameter {
-            owner: effect.name.to_string(),
-            name: missing.name.to_string(),
-        });
+        return Err(SimError::missing_parameter(effect.name, &missing.name));
     }
     Ok(parameters
         .iter()

@@ -20,12 +20,9 @@ use stretch_effects::Start;
 use crate::SimError;
 
 /// Returns an error unless `found` equals `expected`; both are numbers of values.
-pub(crate) fn check_length(
-    name: &'static str,
-    expected: usize,
-    found: usize,
-) -> Result<(), SimError> {
-    if expected == found { Ok(()) } else { Err(SimError::Length { name, expected, found }) }
+pub(crate) fn check_length(name: &str, expected: usize, found: usize) -> Result<(), SimError> {
+    let refused = || format!("`{name}` has {found} values, but {expected} are needed");
+    if expected == found { Ok(()) } else { Err(SimError::Refused(refused())) }
 }
 
 /// Openings of the two valves, one value per sample, each held until the next sample.
@@ -46,7 +43,10 @@ impl Openings<'_> {
         check_length("outlet", self.inlet.len(), self.outlet.len())?;
         for (column, openings) in [("inlet", self.inlet), ("outlet", self.outlet)] {
             if let Some(sample) = openings.iter().position(|u| !(0.0..=1.0).contains(u)) {
-                return Err(SimError::Opening { column, sample, value: openings[sample] });
+                let value = openings[sample];
+                return Err(SimError::Refused(format!(
+                    "{column}, sample {sample}: opening {value} is outside 0 .. 1"
+                )));
             }
         }
         Ok(self.inlet.len())

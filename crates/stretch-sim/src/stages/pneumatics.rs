@@ -84,17 +84,17 @@ impl Pneumatics {
                     volumes.push(law);
                 }
                 Action::Droop(_) if droops.len() == MOST_DROOPS => {
-                    return Err(SimError::NotHere {
-                        name: active.name().to_string(),
-                        needs: "a third state of the supply",
-                    });
+                    return Err(SimError::not_here(active.name(), "a third state of the supply"));
                 }
                 Action::Droop(droop) => droops.push(droop),
                 _ => {}
             }
         }
         if delay_s != grid.delay_s() {
-            return Err(SimError::GridDelay { expected: delay_s, found: grid.delay_s() });
+            return Err(SimError::Refused(format!(
+                "the time grid was made for a valve delay of {} s, but the effects have a delay of {delay_s} s",
+                grid.delay_s()
+            )));
         }
         let inlet = Row::new(inlet, Self::CELLS);
         let outlet = Row::new(outlet, inlet.end());
@@ -159,9 +159,7 @@ impl Pneumatics {
     pub(crate) fn check_uncoupled(&self) -> Result<(), SimError> {
         match self.coupled_by {
             None => Ok(()),
-            Some(name) => {
-                Err(SimError::NotHere { name: name.into(), needs: "the length of the muscle" })
-            }
+            Some(name) => Err(SimError::not_here(name, "the length of the muscle")),
         }
     }
 
@@ -245,10 +243,7 @@ impl Pneumatics {
     ) -> Result<Chamber, SimError> {
         let absolute = 1e3 * initial_kpa + self.atmosphere_pa;
         if !(absolute.is_finite() && absolute > 0.0) {
-            return Err(SimError::NotPositive {
-                name: "initial pressure, Pa absolute",
-                value: absolute,
-            });
+            return Err(SimError::not_positive("initial pressure, Pa absolute", absolute));
         }
         let mut droops = [0.0; MOST_DROOPS];
         if let Start::Carried { rest_s } = start {

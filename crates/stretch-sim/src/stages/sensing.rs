@@ -155,10 +155,7 @@ impl Sensing {
     ) -> Result<(), SimError> {
         check_length("length_mm", self.grid.nodes(bridge_v.len()), length_mm.len())?;
         if let (Some(name), true) = (self.needs_pressure, pressure_kpa.is_empty()) {
-            return Err(SimError::NotHere {
-                name: name.to_string(),
-                needs: Need::Pressure.words(),
-            });
+            return Err(SimError::not_here(name, Need::Pressure.words()));
         }
         if !pressure_kpa.is_empty() {
             check_length("pressure_kpa", length_mm.len(), pressure_kpa.len())?;

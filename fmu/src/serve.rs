@@ -5,9 +5,8 @@ use std::io::{ErrorKind, Read, Write};
 
 use serde_json::{Map, Value, json};
 use stretch_problem::{
-    AlteredColumn, Ask, RecordedSession, SessionColumn, SessionPart, SessionStage, Source,
-    SourceError,
-    worker::{FrameError, PREFIX, Prefix, WorkerFrame},
+    AlteredColumn, Ask, RecordedSession, Source, SourceError,
+    worker::{FrameError, PREFIX, Prefix, WorkerFrame, read_session},
 };
 
 /// Version of the protocol.
@@ -120,50 +119,12 @@ fn receive(from: &mut impl Read) -> Result<Option<WorkerFrame>, ServeError> {
     Ok(Some(WorkerFrame::parse(&header, &body)?))
 }
 
-fn text(of: &Value, key: &str) -> Option<String> {
-    of.get(key)?.as_str().map(str::to_owned)
-}
-
-fn texts(of: &Value) -> Option<Vec<String>> {
-    of.as_array()?.iter().map(|t| t.as_str().map(str::to_owned)).collect()
-}
-
 fn each<T>(
     of: &Map<String, Value>,
     key: &str,
     read: impl FnMut(&Value) -> Option<T>,
 ) -> Option<Vec<T>> {
     of.get(key)?.as_array()?.iter().map(read).collect()
-}
-
-fn read_session(frame: &WorkerFrame) -> Option<RecordedSession> {
-    let header = &frame.header;
-    let mut end = 0;
-    let trials = each(header, "trials", |t| {
-        let from = end;
-        end += usize::try_from(t.get("samples")?.as_u64()?).ok()?;
-        let start_s = t.get("start_s")?.as_f64()?;
-        Some(SessionPart { name: text(t, "name")?, samples: from..end, start_s })
-    })?;
-    let stages = each(header, "stages", |s| {
-        let (name, output) = (text(s, "name")?, text(s, "output")?);
-        Some(SessionStage { name, output, inputs: texts(s.get("inputs")?)? })
-    })?;
-    let mut rest = frame.body.as_slice();
-    let columns = each(header, "columns", |c| {
-        let (values, behind) = rest.split_at_checked(end)?;
-        rest = behind;
-        let (name, unit) = (text(c, "name")?, text(c, "unit")?);
-        Some(SessionColumn { name, unit, values: values.to_vec() })
-    })?;
-    Some(RecordedSession {
-        dt_s: header.get("dt_s")?.as_f64()?,
-        trials,
-        stages,
-        parameters: texts(header.get("parameters")?)?,
-        effects: texts(header.get("effects")?)?,
-        columns,
-    })
 }
 
 /// A request to simulate, with its altered inputs if there are any.

@@ -1,5 +1,7 @@
 //! Why a problem was refused.
 
+use std::fmt;
+
 use stretch_data::DataError;
 use stretch_gap::{DescriptionError, GapError};
 use stretch_recording::RecordingError;
@@ -18,61 +20,12 @@ pub enum ProblemError {
     /// Stages, parameters, effects and trials of the problem contradict one another.
     #[error(transparent)]
     Description(#[from] DescriptionError),
-    /// A name is unknown.
-    #[error("{owner}: there is no {what} {name}{meant}; there are {known}")]
-    Unknown {
-        /// Entry that holds the name.
-        owner: String,
-        /// Kind of the entry that the name should match.
-        what: &'static str,
-        /// The name.
-        name: String,
-        /// A known name that may be meant, in parentheses.
-        meant: String,
-        /// The known names.
-        known: String,
-    },
-    /// A value is not allowed, or the values of a column are not plausible.
-    #[error("{owner}: {found}; {hint}")]
-    Value {
-        /// Entry or column that holds the value.
-        owner: String,
-        /// What is wrong.
-        found: String,
-        /// What to do.
-        hint: String,
-    },
-    /// A simulator could not be started.
-    #[error("{0}")]
-    Simulator(String),
     /// The rig or an effect was refused.
     #[error(transparent)]
     Sim(#[from] SimError),
-    /// A rig file was refused.
-    #[error("{file}: {cause}")]
-    RigFile {
-        /// The file.
-        file: String,
-        /// What is wrong in the file.
-        #[source]
-        cause: SimError,
-    },
-    /// There are too few data to fit.
-    #[error("{what}: {hint}")]
-    TooLittle {
-        /// What is missing.
-        what: String,
-        /// What to do.
-        hint: String,
-    },
-    /// A simulated output was not finite.
-    #[error(
-        "{stage}: the simulation gave a number that is not finite; a parameter of the rig is too large or too small"
-    )]
-    NotFinite {
-        /// The stage.
-        stage: String,
-    },
+    /// An entry, a column, a rig file or a simulator was refused. The message says where, what is wrong, and what to do.
+    #[error("{0}")]
+    Refused(String),
 }
 
 /// Refuses a sample rate outside 1e-3 .. 1e7 Hz, because such time stamps are in another unit. The
@@ -94,31 +47,38 @@ impl From<GridError> for ProblemError {
 impl ProblemError {
     /// The error for a name that is not among the known ones.
     pub(crate) fn unknown<'a>(
-        owner: impl Into<String>,
-        what: &'static str,
+        owner: impl fmt::Display,
+        what: &str,
         name: &str,
         known: impl Iterator<Item = &'a str> + Clone,
     ) -> Self {
-        let meant = stretch_data::nearest(name, known.clone());
-        Self::Unknown {
-            owner: owner.into(),
-            what,
-            name: name.to_owned(),
-            meant: meant.map_or(String::new(), |other| format!(" (did you mean {other}?)")),
-            known: known.collect::<Vec<_>>().join(", "),
-        }
+        let all: Vec<&str> = known.clone().collect();
+        Self::unknown_among(owner, (what, name), known, &all.join(", "))
     }
 
-    pub(crate) fn value(
-        owner: impl Into<String>,
-        found: impl Into<String>,
-        hint: impl Into<String>,
+    /// As [`ProblemError::unknown`], with the known names in other words.
+    pub(crate) fn unknown_among<'a>(
+        owner: impl fmt::Display,
+        (what, name): (&str, &str),
+        known: impl Iterator<Item = &'a str>,
+        all: &str,
     ) -> Self {
-        Self::Value { owner: owner.into(), found: found.into(), hint: hint.into() }
+        let meant = stretch_data::nearest(name, known);
+        let meant = meant.map_or(String::new(), |other| format!(" (did you mean {other}?)"));
+        Self::Refused(format!("{owner}: there is no {what} {name}{meant}; there are {all}"))
+    }
+
+    /// The error for a value that is not allowed, or a column whose values are not plausible.
+    pub(crate) fn value(
+        owner: impl fmt::Display,
+        found: impl fmt::Display,
+        hint: impl fmt::Display,
+    ) -> Self {
+        Self::Refused(format!("{owner}: {found}; {hint}"))
     }
 
     /// Returns the error for a column that stays constant.
-    pub(crate) fn dead(column: impl Into<String>, found: String) -> Self {
+    pub(crate) fn dead(column: impl fmt::Display, found: String) -> Self {
         Self::value(column, found, "the channel is dead: check the sensor and its cable")
     }
 
@@ -128,8 +88,9 @@ impl ProblemError {
         Self::too_little(what, format!("at least {least} are needed for a diagnosis"))
     }
 
-    pub(crate) fn too_little(what: impl Into<String>, hint: impl Into<String>) -> Self {
-        Self::TooLittle { what: what.into(), hint: hint.into() }
+    /// Returns the error for data that do not suffice.
+    pub(crate) fn too_little(what: impl fmt::Display, hint: impl fmt::Display) -> Self {
+        Self::Refused(format!("{what}: {hint}"))
     }
 }
 

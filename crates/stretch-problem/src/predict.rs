@@ -201,7 +201,7 @@ pub fn predict_with(
     let trial = |at: usize| {
         let (name, samples) = (session.trials[at].name.clone(), &session.trials[at].samples);
         let seconds = samples.len() as f64 * session.dt_s;
-        let stages = 0..with.stages.len();
+        let stages = 0..session.stages.len();
         let outputs = stages.map(|stage| score(&with, stage, samples, &outputs)).collect();
         PredictedTrial { name, seconds, outputs, extrapolated: extrapolated(&with, samples) }
     };
@@ -246,9 +246,9 @@ fn simulate(problem: &Checked, source: &Arc<dyn Source>) -> Result<Vec<Vec<f64>>
     let stage = |stage: usize| {
         let mut out = vec![0.0; problem.session().samples(trials)];
         let done = simulator.simulate(Run::exact(stage, &model, trials), &mut out);
-        done.map(|()| out).map_err(|error| ProblemError::Simulator(error.to_string()))
+        done.map(|()| out).map_err(|error| ProblemError::Refused(error.to_string()))
     };
-    (0..problem.stages.len()).map(stage).collect()
+    (0..problem.session().stages.len()).map(stage).collect()
 }
 
 /// Scores a stage on some samples; `outputs` are those with the fix and those without.
@@ -258,7 +258,7 @@ fn score(
     samples: &Range<usize>,
     outputs: &[Vec<Vec<f64>>; 2],
 ) -> PredictedOutput {
-    let (spec, noise) = (&problem.description().stages[stage], problem.noise[stage]);
+    let (spec, noise) = (&problem.description().stages[stage], problem.recorded[stage].noise.sd());
     let measured = problem.columns.all(&spec.channel).get(samples.clone()).unwrap_or(&[]);
     let [with, without] = outputs.each_ref().map(|all| all[stage][samples.clone()].to_vec());
     let [rmse, rmse_without] = [&with, &without].map(|predicted| {
@@ -295,7 +295,7 @@ fn extrapolated(problem: &Checked, samples: &Range<usize>) -> Vec<String> {
             recording is outside"))
     };
     let mut names: Vec<&String> =
-        problem.stages.iter().flat_map(|s| s.inputs.iter().chain([&s.output])).collect();
+        problem.session().stages.iter().flat_map(|s| s.inputs.iter().chain([&s.output])).collect();
     names.sort_unstable();
     names.dedup();
     let of = |name: &String| {

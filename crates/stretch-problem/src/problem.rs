@@ -125,7 +125,7 @@ impl Problem {
         if let Some(several) = columns.filter(|(_, signal)| signal.contains(',')) {
             if rig.is_some() {
                 let hint = "diagnose the signals one at a time";
-                return Err(no_option("--rig", "a rig file describes one signal", hint));
+                return Err(ProblemError::value("--rig", "a rig file describes one signal", hint));
             }
             let source = Box::new(read_sensors(path, several, reading.without, recorded)?);
             return Ok(Self { name: name_of(path), source });
@@ -155,7 +155,11 @@ impl Problem {
     ) -> Result<Self, ProblemError> {
         if reading.rig.is_some() {
             let hint = "set the parameters in the problem's file";
-            return Err(no_option("--rig", "it works with the built-in simulators only", hint));
+            return Err(ProblemError::value(
+                "--rig",
+                "it works with the built-in simulators only",
+                hint,
+            ));
         }
         if let Some((reference, signal)) = reading.columns {
             (file.reference, file.signal) = (Some(reference.into()), Some(signal.into()));
@@ -166,12 +170,12 @@ impl Problem {
         let recorded = recorded.strict(reading.strict);
         let workers = file.workers(1)?;
         let workers =
-            workers.ok_or_else(|| ProblemError::Simulator("the simulator is built in".into()))?;
+            workers.ok_or_else(|| ProblemError::Refused("the simulator is built in".into()))?;
         let program = workers.shown();
         if path.is_dir() {
             let inside = path.join(IN_FOLDER);
             let inside = inside.display();
-            return Err(ProblemError::Simulator(format!(
+            return Err(ProblemError::Refused(format!(
                 "{inside}: it names a program to run ({program}), but no program is run for a folder; if you trust it, give the file itself, {inside}"
             )));
         }
@@ -202,10 +206,6 @@ impl Problem {
     pub(crate) fn source(&self) -> &dyn Diagnosable {
         &*self.source
     }
-}
-
-fn no_option(option: &str, found: &str, hint: &str) -> ProblemError {
-    ProblemError::value(option, found, hint)
 }
 
 /// Returns the name of data: the name of the folder or file without its extension.

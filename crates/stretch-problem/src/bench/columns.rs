@@ -6,7 +6,10 @@ use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, Split, ends};
 use stretch_gap::{RowsUsed, SampleRoles, TrialSpec};
 
 use super::undetermined::{undetermined, undetermined_behind_gap};
-use crate::{black_box::StageEntry, error::ProblemError};
+use crate::{
+    black_box::{StageEntry, velocity::of_position},
+    error::ProblemError,
+};
 
 /// Bounds of the least number of samples of a part of a trial. The least number is the number of samples in five
 /// seconds, limited to these bounds. Shorter parts are left out.
@@ -189,6 +192,12 @@ impl Columns {
     /// Trials that come from recordings with an index of at least `first`.
     pub(crate) fn sources_from(&self, first: usize) -> Vec<usize> {
         (0..self.sources.len()).filter(|trial| self.sources[*trial] >= first).collect()
+    }
+
+    /// Greatest rate of a signal outside the test samples, per second.
+    pub(crate) fn fastest(&self, values: &[f64]) -> f64 {
+        let rates = of_position(values, &self.ranges, self.dt_s);
+        self.fitted().flat_map(|range| &rates[range]).fold(0.0, |a, rate| rate.abs().max(a))
     }
 
     /// Range of the samples of every trial outside the test samples; empty for a test trial.

@@ -100,7 +100,9 @@ impl Bench {
 pub(crate) fn finite(stage: &str, samples: &[f64]) -> Result<(), ProblemError> {
     match samples.iter().all(|x| x.is_finite()) {
         true => Ok(()),
-        false => Err(ProblemError::NotFinite { stage: stage.to_owned() }),
+        false => Err(ProblemError::Refused(format!(
+            "{stage}: the simulation gave a number that is not finite; a parameter of the rig is too large or too small"
+        ))),
     }
 }
 

@@ -8,7 +8,7 @@ use stretch_sim::{GaugeRig, Rig, SimError};
 use crate::error::ProblemError;
 
 fn located(path: &Path, cause: SimError) -> ProblemError {
-    ProblemError::RigFile { file: path.display().to_string(), cause }
+    ProblemError::Refused(format!("{}: {cause}", path.display()))
 }
 
 /// Reads a whole rig.

@@ -1,6 +1,6 @@
 //! A user's own problem, checked: recordings on one grid, stages, parameters, effects, and the session for a source.
 
-use std::ops::Range;
+use std::{ops::Range, sync::Arc};
 
 use stretch_data::{Quantity, ends, unit, unit_of};
 use stretch_effects::{Grid, Kind, Side, Sketch, kind_named};
@@ -9,7 +9,7 @@ use stretch_gap::{Description, DescriptionSpec, Noise, ParameterSpec, StageSpec}
 use stretch_sim::Tolerance;
 
 use super::{
-    begins::{Before, Begins, begins},
+    begins::{Begins, begins},
     catalogue::{Acting, Around, behind_outputs, own_effects},
     facts::facts,
     source::{RecordedSession, SessionColumn, SessionPart, SessionStage},
@@ -26,15 +26,12 @@ use crate::{
 #[derive(Debug, Clone)]
 pub struct Checked {
     about: Description,
-    session: RecordedSession,
+    pub(crate) session: Arc<RecordedSession>,
     pub(crate) columns: Columns,
     /// Name and values of a column that distinguishes runs; no effect uses it.
     pub(crate) by: Option<(String, Vec<f64>)>,
-    pub(crate) stages: Vec<StageEntry>,
-    /// Noise of the inputs of each stage.
-    pub(crate) input_noise: Vec<Vec<f64>>,
-    /// Noise of the output of each stage, one standard deviation.
-    pub(crate) noise: Vec<f64>,
+    /// By stage, what its recordings show.
+    pub(crate) recorded: Vec<StageRecord>,
     pub(crate) wrappers: Vec<Placed>,
     /// The action behind each effect of the catalogue.
     pub(crate) acting: Vec<Acting>,
@@ -43,8 +40,6 @@ pub struct Checked {
     pub(crate) off: Vec<f64>,
     /// Wrappers that act in every run, with their values.
     pub(crate) standing: Vec<(usize, Vec<f64>)>,
-    /// By stage, the commands at which the operators in front of it begin.
-    pub(crate) before: Vec<Before>,
     /// The entries of the problem, without the recordings.
     pub(crate) spec: ProblemSpec,
     pub(crate) grid: Grid,
@@ -82,20 +77,12 @@ impl Checked {
             "" => unit_of(column),
             stated => stated.to_owned(),
         };
-        let velocities: Vec<Option<Vec<f64>>> =
-            stages.iter().map(|stage| velocity(stage, &columns)).collect();
-        let positions: Vec<Option<Vec<f64>>> =
-            stages.iter().map(|stage| position(stage, &columns)).collect();
-        let noises: Vec<Noise> = stages.iter().map(|stage| noise(stage, &columns)).collect();
-        let with_noise = || stages.iter().zip(&noises);
-        let begun: Vec<Begins> = with_noise().map(|(s, n)| begins_of(s, n, &columns)).collect();
-        let before: Vec<Before> = begun.iter().map(|begins| begins.before.clone()).collect();
+        let record = |stage| StageRecord::of(stage, inputs, &columns);
+        let recorded: Vec<StageRecord> = stages.iter().map(record).collect();
         let among = Among {
             columns: &columns,
-            before: &before,
             stages,
-            velocities: &velocities,
-            positions: &positions,
+            recorded: &recorded,
             names_motion: spec.stages.iter().map(names_motion).collect(),
             kinds: &spec.kinds,
         };
@@ -106,9 +93,13 @@ impl Checked {
         let looked_for = around.without(looked_for, &spec.without)?;
         let (acting, catalogue) = looked_for.into_iter().unzip();
         let Around { wrappers, standing, .. } = around;
-        notes.extend(begins_note(&begun, &wrappers));
+        notes.extend(begins_note(&recorded, &wrappers));
         let about = Description::new(DescriptionSpec {
-            stages: with_noise().map(|(s, n)| stage_spec(s, n, parameters, &unit_of)).collect(),
+            stages: stages
+                .iter()
+                .zip(&recorded)
+                .map(|(stage, own)| stage_spec(stage, &own.noise, parameters, &unit_of))
+                .collect(),
             parameters: parameters.iter().map(parameter_spec).collect::<Result<_, _>>()?,
             effects: catalogue,
             trials: columns.trials.clone(),
@@ -118,10 +109,8 @@ impl Checked {
         let known = facts(&about, &session, &columns, sensor.as_ref());
         Ok(Self {
             about: about.with_record(known)?,
-            session,
-            stages: stages.clone(),
-            input_noise: stages.iter().map(|stage| input_noise(stage, inputs)).collect(),
-            noise: noises.iter().map(Noise::sd).collect(),
+            session: Arc::new(session),
+            recorded,
             parts: parts(&columns),
             columns,
             by,
@@ -129,7 +118,6 @@ impl Checked {
             acting,
             off,
             standing,
-            before,
             grid,
             notes,
             spec,
@@ -211,46 +199,61 @@ impl Checked {
 
     /// Indices of the inputs of a stage that drive no other stage.
     pub(crate) fn unshared(&self, stage: usize) -> impl Iterator<Item = usize> {
-        let columns = || self.stages.iter().flat_map(|s| &s.inputs);
-        let own = self.stages[stage].inputs.iter().enumerate();
+        let columns = || self.session.stages.iter().flat_map(|s| &s.inputs);
+        let own = self.session.stages[stage].inputs.iter().enumerate();
         own.filter(move |(_, column)| columns().filter(|other| other == column).count() == 1)
             .map(|(input, _)| input)
     }
 
     pub(crate) fn stage_inputs(&self, stage: usize) -> impl Iterator<Item = &[f64]> {
-        self.stages[stage].inputs.iter().map(|c| self.columns.all(c))
+        self.session.stages[stage].inputs.iter().map(|c| self.columns.all(c))
     }
 }
 
-/// Noise of the inputs of a stage, one standard deviation each.
-fn input_noise(stage: &StageEntry, inputs: &[Input]) -> Vec<f64> {
-    let noise = |c: &String| inputs.iter().find(|i| i.column == *c).map_or(0.0, |i| i.noise);
-    stage.inputs.iter().map(noise).collect()
+/// What the recordings of a stage show.
+#[derive(Debug, Clone)]
+pub(crate) struct StageRecord {
+    /// Noise of the inputs, one standard deviation each.
+    pub(crate) input_noise: Vec<f64>,
+    /// Noise of the output: as stated, or estimated while its inputs rest, or from second differences.
+    pub(crate) noise: Noise,
+    /// The commands at which the operators in front of the stage begin.
+    pub(crate) begins: Begins,
+    /// Velocity of the parts that have friction: recorded, or the derivative of a recorded position.
+    pub(crate) velocity: Option<Vec<f64>>,
+    /// Position of these parts: recorded, or the integral of a recorded velocity.
+    pub(crate) position: Option<Vec<f64>>,
 }
 
-/// Noise of the output of a stage: as stated, or estimated while its inputs rest, or from second
-/// differences of the recordings.
-fn noise(stage: &StageEntry, columns: &Columns) -> Noise {
-    let (values, looked) = (columns.all(&stage.output), columns.looked_at());
-    let inputs: Vec<&[f64]> = stage.inputs.iter().map(|name| columns.all(name)).collect();
-    let parts = looked.iter().map(|r| &values[r.clone()]);
-    let stated = stage.noise.map(Noise::known);
-    stated
-        .or_else(|| Noise::of_rests(values, &inputs, &looked, columns.dt_s))
-        .unwrap_or_else(|| Noise::of_differences(parts, columns.dt_s))
-}
-
-/// The beginnings of the trials of a stage.
-fn begins_of(stage: &StageEntry, noise: &Noise, columns: &Columns) -> Begins {
-    let inputs: Vec<&[f64]> = stage.inputs.iter().map(|name| columns.all(name)).collect();
-    let output = columns.all(&stage.output);
-    begins((&inputs, output), (&columns.ranges, &columns.looked_at()), noise.sd())
+impl StageRecord {
+    fn of(stage: &StageEntry, inputs: &[Input], columns: &Columns) -> Self {
+        let Columns { ranges, dt_s, .. } = columns;
+        let (output, looked) = (columns.all(&stage.output), columns.looked_at());
+        let driving: Vec<&[f64]> = stage.inputs.iter().map(|name| columns.all(name)).collect();
+        let parts = looked.iter().map(|r| &output[r.clone()]);
+        let stated = stage.noise.map(Noise::known);
+        let noise = stated
+            .or_else(|| Noise::of_rests(output, &driving, &looked, *dt_s))
+            .unwrap_or_else(|| Noise::of_differences(parts, *dt_s));
+        let column = |name: &Option<String>| name.as_ref().and_then(|name| columns.of(name));
+        let (velocity, position) = (column(&stage.velocity), column(&stage.position));
+        let derivative = || position.map(|x| of_position(x, ranges, *dt_s));
+        let integral = || velocity.map(|v| integral_of(v, ranges, *dt_s));
+        let stated = |c: &String| inputs.iter().find(|i| i.column == *c).map_or(0.0, |i| i.noise);
+        Self {
+            input_noise: stage.inputs.iter().map(stated).collect(),
+            begins: begins((&driving, output), (ranges, &looked), noise.sd()),
+            noise,
+            velocity: velocity.map(<[f64]>::to_vec).or_else(derivative),
+            position: position.map(<[f64]>::to_vec).or_else(integral),
+        }
+    }
 }
 
 /// A note on trials that begin with a step from an unknown command.
-fn begins_note(begun: &[Begins], wrappers: &[Placed]) -> Option<String> {
+fn begins_note(recorded: &[StageRecord], wrappers: &[Placed]) -> Option<String> {
     let in_front = wrappers.iter().filter(|w| w.site.side == Side::Input);
-    let unknown = |w: &Placed| begun[w.site.stage].unknown;
+    let unknown = |w: &Placed| recorded[w.site.stage].begins.unknown;
     let first = in_front.max_by_key(|w| unknown(w)).filter(|w| unknown(w) > 0)?;
     let (column, trials) = (&first.site.column, unknown(first));
     let s = if trials == 1 { "" } else { "s" };
@@ -295,22 +298,6 @@ fn sensor_of(
     let outputs = stages.iter().map(|s| s.output.as_str());
     let at = at.ok_or_else(|| ProblemError::unknown("signal", "output", signal, outputs))?;
     Ok((at, reference.clone()))
-}
-
-fn velocity(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
-    let recorded = stage.velocity.as_ref().and_then(|c| columns.of(c));
-    let position = || stage.position.as_ref().and_then(|c| columns.of(c));
-    let differences = |x: &[f64]| of_position(x, &columns.ranges, columns.dt_s);
-    recorded.map(<[f64]>::to_vec).or_else(|| position().map(differences))
-}
-
-/// The position of the parts of a stage that have friction: recorded, or the integral of a recorded
-/// velocity.
-fn position(stage: &StageEntry, columns: &Columns) -> Option<Vec<f64>> {
-    let recorded = stage.position.as_ref().and_then(|c| columns.of(c));
-    let velocity = || stage.velocity.as_ref().and_then(|c| columns.of(c));
-    let integral = |v: &[f64]| integral_of(v, &columns.ranges, columns.dt_s);
-    recorded.map(<[f64]>::to_vec).or_else(|| velocity().map(integral))
 }
 
 /// Every channel of every stage, inputs first.

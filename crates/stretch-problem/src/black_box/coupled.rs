@@ -68,7 +68,8 @@ fn probe(problem: &Checked, stage: usize, input: usize) -> Option<Altered> {
     let mut most = (0.0, Vec::new(), Vec::new());
     for (at, wrapper) in acting(problem).filter(|(_, w)| is_at(w, stage, input)) {
         for values in &wrapper.starts {
-            let (mut altered, mut before) = (columns[input].clone(), problem.before[stage].clone());
+            let mut before = problem.recorded[stage].begins.before.clone();
+            let mut altered = columns[input].clone();
             wrapper.act(values, &trials, &mut before, &mut altered);
             let by = apart(&altered, &columns[input]);
             if by > most.0 {
@@ -160,12 +161,12 @@ fn moved<'a>(
     let alterations = std::iter::once(&[][..]).chain(probes.chunks(1));
     let wanted: Vec<Inner> =
         alterations.flat_map(|altered| (0..stages).map(move |s| run(s, altered))).collect();
-    let outputs = runs.outputs(session, &wanted, 0);
+    let outputs = runs.outputs(&wanted, 0);
     let (shipped, there) = outputs.split_at(stages);
     let is_moved = |stage: usize, there: &[f64]| {
         let Ok(shipped) = &shipped[stage] else { return false };
         let most = shipped.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-        apart(there, shipped) > (MOVED * problem.noise[stage]).max(ROUNDING * most)
+        apart(there, shipped) > (MOVED * problem.recorded[stage].noise.sd()).max(ROUNDING * most)
     };
     let mut out = Vec::new();
     for (probe, there) in probes.iter().zip(there.chunks(stages)) {

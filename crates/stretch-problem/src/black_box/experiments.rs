@@ -14,7 +14,7 @@ use stretch_data::{Channel, Trial, ends};
 use stretch_effects::{Beside, Side};
 use stretch_gap::{GapError, Laboratory, Model, Plan, Run, Simulator};
 
-use super::{BlackBox, runs::Altered, source::SourceError, velocity::of_position};
+use super::{BlackBox, runs::Altered, source::SourceError};
 use crate::bench::courses::{course, moving, paced};
 
 /// Greatest number of inputs that candidates move.
@@ -23,31 +23,6 @@ const MOVED: usize = 3;
 const PREPARE_MIN: f64 = 0.25;
 /// Smallest noise of an output, a share of its range.
 const LEAST_NOISE: f64 = 1e-6;
-
-/// The external inputs of the simulator, by column, with as many samples as the first trial.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Course(Vec<(String, Vec<f64>)>);
-
-impl Course {
-    fn of(&self, column: &str) -> Option<&[f64]> {
-        let own = self.0.iter().find(|(name, _)| name == column);
-        own.map(|(_, values)| values.as_slice())
-    }
-
-    fn plan(&self, (name, how): (String, String), dt_s: f64) -> Plan {
-        let channel = |(name, values): &(String, Vec<f64>)| Channel {
-            name: name.clone(),
-            values: values.clone(),
-        };
-        let samples = self.0.first().map_or(0, |(_, values)| values.len());
-        let trial = Trial {
-            name: name.clone(),
-            time_s: (0..samples).map(|i| i as f64 * dt_s).collect(),
-            channels: self.0.iter().map(channel).collect(),
-        };
-        Plan { name, how, prepare_min: PREPARE_MIN, trial }
-    }
-}
 
 /// An external input: its name, and its range, median, first value and greatest rate per second over
 /// the samples outside the test samples.
@@ -63,7 +38,6 @@ impl BlackBox {
     /// The external inputs: inputs that are not the output of any stage.
     fn driven(&self) -> Vec<Driven> {
         let session = self.problem.session();
-        let (looked, trials) = (self.problem.columns.looked_at(), &self.problem.columns.ranges);
         let is_output = |name: &str| session.stages.iter().any(|s| s.output == name);
         let mut out: Vec<Driven> = Vec::new();
         for name in session.stages.iter().flat_map(|s| &s.inputs) {
@@ -71,29 +45,26 @@ impl BlackBox {
                 continue;
             }
             let column = self.problem.columns.all(name);
-            let all = |of: &[f64]| -> Vec<f64> {
-                looked.iter().flat_map(|r| &of[r.clone()]).copied().collect()
-            };
-            let mut values = all(column);
+            let looked = self.problem.columns.fitted();
+            let mut values: Vec<f64> = looked.flat_map(|r| &column[r]).copied().collect();
             let Some(&first) = values.first() else { continue };
             let range = ends(&values);
             let middle = values.len() / 2;
             let median = *values.select_nth_unstable_by(middle, f64::total_cmp).1;
-            let rates = all(&of_position(column, trials, session.dt_s));
-            let fastest = rates.iter().fold(0.0, |a: f64, rate| a.max(rate.abs()));
+            let fastest = self.problem.columns.fastest(column);
             out.push(Driven { name: name.clone(), range, median, first, fastest });
         }
         out
     }
 
-    /// A course in which one input goes through points and all others rest at their medians.
-    fn moved(&self, all: &[Driven], moved: Option<(usize, &[(f64, f64)])>) -> Course {
+    /// A trial in which one input goes through points and all others rest at their medians.
+    fn moved(&self, name: &str, all: &[Driven], moved: Option<(usize, &[(f64, f64)])>) -> Trial {
         let (samples, dt_s) = (self.problem.session().samples(1), self.description().dt_s);
-        let one = |(at, d): (usize, &Driven)| {
+        let one = |(at, d): (usize, &Driven)| -> Vec<f64> {
             let (low, high) = d.range;
             let span = high - low;
             if d.fastest <= 0.0 {
-                return (d.name.clone(), vec![d.first; samples]);
+                return vec![d.first; samples];
             }
             let share = |x: f64| (x - low) / span;
             let rest = [(share(d.median), 0.0)];
@@ -103,23 +74,27 @@ impl BlackBox {
             let last = points[points.len() - 1].0;
             let points = paced(&points, span / d.fastest);
             let shares = course(&points, dt_s).chain(std::iter::repeat(last)).take(samples);
-            (d.name.clone(), shares.map(|x| low + span * x).collect())
+            shares.map(|x| low + span * x).collect()
         };
-        Course(all.iter().enumerate().map(one).collect())
+        let values = all.iter().enumerate().map(one);
+        let names = all.iter().map(|d| d.name.clone());
+        let channels = names.zip(values).map(|(name, values)| Channel { name, values }).collect();
+        let time_s = (0..samples).map(|i| i as f64 * dt_s).collect();
+        Trial { name: name.to_owned(), time_s, channels }
     }
 
     /// The inputs of a stage in an experiment in which the stages before it gave `outputs`.
     fn inputs_in(
         &self,
         stage: usize,
-        course: &Course,
+        course: &Trial,
         outputs: &[Vec<f64>],
     ) -> Result<Vec<Vec<f64>>, GapError> {
         let session = self.problem.session();
         let of = |column: &String| {
             let before = session.stages[..stage].iter().position(|s| s.output == *column);
             let known =
-                course.of(column).or(before.and_then(|at| outputs.get(at)).map(Vec::as_slice));
+                course.channel(column).or(before.and_then(|at| outputs.get(at)).map(Vec::as_slice));
             known.map(<[f64]>::to_vec).ok_or_else(|| {
                 let stage = &session.stages[stage].name;
                 let why = format!("{stage} is driven by {column}, the output of a later stage");
@@ -155,7 +130,7 @@ impl BlackBox {
         &self,
         run: &Run<'_>,
         stage: usize,
-        course: &Course,
+        course: &Trial,
         outputs: &[Vec<f64>],
     ) -> Result<Altered, GapError> {
         let mut columns = self.inputs_in(stage, course, outputs)?;
@@ -171,9 +146,9 @@ impl BlackBox {
 }
 
 impl Laboratory for BlackBox {
-    type Setting = Course;
+    type Setting = Trial;
 
-    fn experiments(&self) -> Vec<(Plan, Course)> {
+    fn experiments(&self) -> Vec<(Plan, Trial)> {
         let all = self.driven();
         let dt_s = self.description().dt_s;
         let lasts_s = self.problem.session().samples(1) as f64 * dt_s;
@@ -186,31 +161,34 @@ impl Laboratory for BlackBox {
                 let whole_s: f64 = points.iter().skip(1).map(|(_, seconds)| seconds).sum();
                 let scaled: Vec<(f64, f64)> =
                     points.iter().map(|(share, s)| (*share, s * lasts_s / whole_s)).collect();
-                let setting = self.moved(&all, Some((at, &scaled)));
                 let (name, how) = match all.len() {
                     1 => (name.to_owned(), how.to_owned()),
                     _ => (format!("{name} of {}", d.name), format!("{how} By {}.", d.name)),
                 };
-                candidates.push((setting.plan((name, how), dt_s), setting));
+                candidates.push((how, self.moved(&name, &all, Some((at, &scaled)))));
             }
         }
-        let rest = self.moved(&all, None);
         let how = "Leave all inputs at their median: what changes does not come from motion.";
-        candidates.push((rest.plan(("rest".to_owned(), how.to_owned()), dt_s), rest));
-        candidates
+        candidates.push((how.to_owned(), self.moved("rest", &all, None)));
+        let plan = |(how, trial): (String, Trial)| {
+            let (name, prepare_min) = (trial.name.clone(), PREPARE_MIN);
+            (Plan { name, how, prepare_min, trial: trial.clone() }, trial)
+        };
+        candidates.into_iter().map(plan).collect()
     }
 
     /// Returns the measured inputs of the first trial.
-    fn done(&self) -> Course {
+    fn done(&self) -> Trial {
         let samples = self.problem.session().samples(1);
         let measured = |d: Driven| {
-            let column = self.problem.columns.all(&d.name);
-            (d.name, column[..samples].to_vec())
+            let values = self.problem.columns.all(&d.name)[..samples].to_vec();
+            Channel { name: d.name, values }
         };
-        Course(self.driven().into_iter().map(measured).collect())
+        let channels = self.driven().into_iter().map(measured).collect();
+        Trial { channels, ..Trial::default() }
     }
 
-    fn predict(&self, model: &Model, course: &Course) -> Result<Vec<Vec<f64>>, GapError> {
+    fn predict(&self, model: &Model, course: &Trial) -> Result<Vec<Vec<f64>>, GapError> {
         let session = self.problem.session();
         let trials = self.trials_of();
         let mut outputs: Vec<Vec<f64>> = Vec::new();
@@ -225,7 +203,7 @@ impl Laboratory for BlackBox {
             let mut altered: Vec<Altered> = others.chain([own]).collect();
             altered.sort_by_key(|a| a.stage);
             let inner = self.driven_by(&run, altered);
-            let answer = self.runs.outputs(session, &[inner], 0).pop();
+            let answer = self.runs.outputs(&[inner], 0).pop();
             let answer = answer.unwrap_or_else(|| Err(SourceError::Gone("no answer".into())));
             let mut output =
                 answer.map_err(|error| super::refused(error, self.least_runs()))?.to_vec();
@@ -236,7 +214,7 @@ impl Laboratory for BlackBox {
         }
         for (stage, output) in outputs.iter_mut().enumerate() {
             let (low, high) = ends(self.measured(stage));
-            let noise = self.problem.noise[stage].max(LEAST_NOISE * (high - low));
+            let noise = self.problem.recorded[stage].noise.sd().max(LEAST_NOISE * (high - low));
             output.iter_mut().for_each(|y| *y /= noise);
         }
         Ok(outputs)

@@ -30,7 +30,7 @@ impl BlackBox {
 
     /// The run of the source that a model needs.
     pub(super) fn inner(&self, run: &Run<'_>) -> Inner {
-        let stages = 0..self.problem.stages.len();
+        let stages = 0..self.problem.session().stages.len();
         self.driven_by(run, stages.filter_map(|stage| self.altered(run, stage)).collect())
     }
 
@@ -40,7 +40,7 @@ impl BlackBox {
         let is_own = stage == run.stage;
         let mut before = self.acting_at(run, stage, Side::Input);
         before.retain(|(at, _)| is_own || self.coupled().acts_on(*at, run.stage));
-        let noise = &problem.input_noise[stage];
+        let noise = &problem.recorded[stage].input_noise;
         let is_noisy = is_own && noise.iter().any(|sd| *sd > 0.0);
         let noise_seed = run.input_noise.filter(|_| is_noisy);
         if before.is_empty() && noise_seed.is_none() {
@@ -57,7 +57,8 @@ impl BlackBox {
                 column.iter_mut().for_each(|x| *x += sd * random.gauss());
             }
         }
-        let (trials, mut begins) = (self.trials_of(), problem.before[stage].clone());
+        let (trials, mut begins) =
+            (self.trials_of(), problem.recorded[stage].begins.before.clone());
         for (at, values) in &before {
             let wrapper = &problem.wrappers[*at];
             how.extend(alteration(*at, values));

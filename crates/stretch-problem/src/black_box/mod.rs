@@ -25,6 +25,7 @@ use stretch_effects::{Find, Kind, Measured, Side};
 
 use crate::wrap::Trials;
 use catalogue::Acting;
+use checked::StageRecord;
 use coupled::{Coupled, probes};
 use linear::Linear;
 use runs::{Altered, Inner, Runs};
@@ -109,13 +110,11 @@ impl BlackBox {
 
     /// Binds a problem to a source that may be run at most `budget` times.
     pub fn within(problem: Checked, source: Arc<dyn Source>, budget: Option<usize>) -> Self {
-        let samples =
-            problem.columns.is_lost.len().max(problem.parts.last().map_or(1, |p| p.0.end));
-        let stages = if source.answers_all() { problem.stages.len() } else { 1 };
         let probes = probes(&problem, &*source);
-        let turns = problem.stages.iter().map(|s| problem.columns.turn_of(&s.output)).collect();
-        let runs = Runs::new(source, budget, stages * samples, turns);
-        let lines = RwLock::new(vec![None; problem.stages.len()]);
+        let turns = problem.session().stages.iter();
+        let turns = turns.map(|s| problem.columns.turn_of(&s.output)).collect();
+        let runs = Runs::new(source, Arc::clone(&problem.session), budget, turns);
+        let lines = RwLock::new(vec![None; problem.session().stages.len()]);
         let (coupled, undeclared) = (OnceLock::new(), Undeclared::default());
         Self { problem, runs, lines, probes, coupled, undeclared }
     }
@@ -152,14 +151,14 @@ impl BlackBox {
 
     /// Number of runs with random draws of the input noise, for all stages together.
     fn draws(&self) -> usize {
-        let is_noisy = |noise: &&Vec<f64>| noise.iter().any(|sd| *sd > 0.0);
-        DRAWS * self.problem.input_noise.iter().filter(is_noisy).count()
+        let is_noisy = |own: &&StageRecord| own.input_noise.iter().any(|sd| *sd > 0.0);
+        DRAWS * self.problem.recorded.iter().filter(is_noisy).count()
     }
 
     /// Number of runs of the budget that are reserved for the answer.
     fn reserve(&self) -> usize {
         let budget = self.runs.budget().unwrap_or(0);
-        let kept = (FINAL.0 + FINAL.1 * self.problem.stages.len()).min(budget / 2);
+        let kept = (FINAL.0 + FINAL.1 * self.problem.session().stages.len()).min(budget / 2);
         // the noise is drawn again after parameters are re-tuned
         kept + self.draws()
     }
@@ -216,7 +215,7 @@ impl BlackBox {
     /// Applies an effect that is estimated from the recording, on the samples outside the test
     /// samples.
     fn follow(&self, find: Find, stage: usize, values: &[f64], out: &mut [f64]) {
-        let (measured, noise) = (self.measured(stage), self.problem.noise[stage]);
+        let (measured, noise) = (self.measured(stage), self.problem.recorded[stage].noise.sd());
         let end = out.len();
         for range in self.problem.columns.looked_at().into_iter().filter(|r| r.end <= end) {
             let (samples, dt_s) = (&measured[range.clone()], self.description().dt_s);
@@ -254,7 +253,7 @@ impl Simulator for BlackBox {
     }
 
     fn measured(&self, stage: usize) -> &[f64] {
-        self.problem.columns.all(&self.problem.stages[stage].output)
+        self.problem.columns.all(&self.problem.session().stages[stage].output)
     }
 
     fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
@@ -268,7 +267,7 @@ impl Simulator for BlackBox {
         let bases: Vec<(Inner, Option<Apart>)> = runs.iter().map(|run| self.base_of(run)).collect();
         let inner: Vec<Inner> = bases.iter().map(|(inner, _)| inner.clone()).collect();
         let kept_back = runs.iter().map(|run| self.kept_back(run)).max().unwrap_or(0);
-        let outputs = self.runs.outputs(self.problem.session(), &inner, kept_back);
+        let outputs = self.runs.outputs(&inner, kept_back);
         let least = self.least_runs();
         let each = runs.iter().zip(&bases).zip(outputs).zip(outs);
         each.map(|(((run, (_, line)), output), out)| {
@@ -293,7 +292,7 @@ impl Simulator for BlackBox {
         let moves = Linear::moves(&inner, own, &about.parameters);
         let wanted: Vec<Inner> =
             std::iter::once(&inner).chain(moves.iter().map(|m| &m.inner)).cloned().collect();
-        let outputs = self.runs.outputs(self.problem.session(), &wanted, self.kept_back(&run));
+        let outputs = self.runs.outputs(&wanted, self.kept_back(&run));
         match outputs.into_iter().collect::<Result<Vec<_>, SourceError>>() {
             Ok(outputs) => {
                 self.undeclared.look(&self.problem, &self.runs, (&inner, &moves), &outputs);

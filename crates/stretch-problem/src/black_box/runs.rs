@@ -71,6 +71,7 @@ struct Made {
 /// A source and its answers.
 pub(crate) struct Runs {
     source: Arc<dyn Source>,
+    session: Arc<RecordedSession>,
     budget: Option<usize>,
     made: Mutex<Made>,
     done: Condvar,
@@ -88,16 +89,19 @@ impl std::fmt::Debug for Runs {
 impl Runs {
     pub(crate) fn new(
         source: Arc<dyn Source>,
+        session: Arc<RecordedSession>,
         budget: Option<usize>,
-        samples: usize,
         turns: Vec<Option<f64>>,
     ) -> Self {
+        let answers_all = source.answers_all();
+        let stages = if answers_all { session.stages.len() } else { 1 };
+        let samples = stages * session.samples(session.trials.len());
         let most = NonZeroUsize::new((KEPT / samples.max(1)).max(FEWEST));
         let kept = LruCache::new(most.unwrap_or(NonZeroUsize::MIN));
         let made =
             Made { kept, under_way: HashSet::new(), count: 0, is_repeated: false, note: None };
-        let answers_all = source.answers_all();
-        Self { source, budget, made: Mutex::new(made), done: Condvar::new(), answers_all, turns }
+        let (made, done) = (Mutex::new(made), Condvar::new());
+        Self { source, session, budget, made, done, answers_all, turns }
     }
 
     /// Number of runs that were made.
@@ -135,28 +139,24 @@ impl Runs {
     }
 
     /// The cached output of a run; `None` if it is not in the cache.
-    pub(crate) fn kept(&self, session: &RecordedSession, run: &Inner) -> Option<Arc<Vec<f64>>> {
+    pub(crate) fn kept(&self, run: &Inner) -> Option<Arc<Vec<f64>>> {
         let made = self.lock();
         let kept = made.kept.peek(&self.key(run))?;
-        self.part(session, run, kept)?.ok()
+        self.part(run, kept)?.ok()
     }
 
     /// The part of an answer that a run asks for; `None` if the answer covers fewer trials.
-    fn part(
-        &self,
-        session: &RecordedSession,
-        run: &Inner,
-        kept: &(usize, Answer),
-    ) -> Option<Answer> {
+    fn part(&self, run: &Inner, kept: &(usize, Answer)) -> Option<Answer> {
         let (trials, answer) = kept;
         if *trials < run.trials {
             return None;
         }
-        let own = session.samples(run.trials);
+        let own = self.session.samples(run.trials);
         Some(match answer {
             Err(error) => Err(error.clone()),
             Ok(all) => {
-                let from = if self.answers_all { run.stage * session.samples(*trials) } else { 0 };
+                let from =
+                    if self.answers_all { run.stage * self.session.samples(*trials) } else { 0 };
                 match from == 0 && all.len() == own {
                     true => Ok(Arc::clone(all)),
                     false => Ok(Arc::new(all[from..from + own].to_vec())),
@@ -171,12 +171,7 @@ impl Runs {
     /// If another thread is making a run, this call waits for it. The source is called from a
     /// separate thread, so that a parallel iterator in the source cannot steal work that waits for
     /// that same source.
-    pub(crate) fn outputs(
-        &self,
-        session: &RecordedSession,
-        wanted: &[Inner],
-        reserve: usize,
-    ) -> Vec<Answer> {
+    pub(crate) fn outputs(&self, wanted: &[Inner], reserve: usize) -> Vec<Answer> {
         let keys: Vec<Key> = wanted.iter().map(|run| self.key(run)).collect();
         let mut out: Vec<Option<Answer>> = vec![None; wanted.len()];
         loop {
@@ -187,7 +182,7 @@ impl Runs {
                 if out[i].is_some() {
                     continue;
                 }
-                if let Some(answer) = made.kept.get(key).and_then(|k| self.part(session, run, k)) {
+                if let Some(answer) = made.kept.get(key).and_then(|k| self.part(run, k)) {
                     out[i] = Some(answer);
                 } else if made.under_way.contains(key) {
                     waits = true;
@@ -208,23 +203,16 @@ impl Runs {
                 continue;
             }
             drop(made);
-            self.make(session, wanted, &keys, &mine, &mut out);
+            self.make(wanted, &keys, &mine, &mut out);
         }
         out.into_iter().flatten().collect()
     }
 
-    fn make(
-        &self,
-        session: &RecordedSession,
-        wanted: &[Inner],
-        keys: &[Key],
-        mine: &[usize],
-        out: &mut [Option<Answer>],
-    ) {
+    fn make(&self, wanted: &[Inner], keys: &[Key], mine: &[usize], out: &mut [Option<Answer>]) {
         let runs: Vec<&Inner> = mine.iter().map(|&i| &wanted[i]).collect();
         let begun = Instant::now();
         let mut answers = self.asked(&runs);
-        self.repeat(session, &runs, &mut answers, begun.elapsed());
+        self.repeat(&runs, &mut answers, begun.elapsed());
         let mut answers = answers.into_iter();
         let mut made = self.lock();
         for &i in mine {
@@ -235,9 +223,9 @@ impl Runs {
                 ))
             };
             let answer = answers.next().unwrap_or_else(nothing);
-            let answer = answer.and_then(|values| self.checked(session, run, values)).map(Arc::new);
+            let answer = answer.and_then(|values| self.checked(run, values)).map(Arc::new);
             let kept = (run.trials, answer);
-            out[i] = self.part(session, run, &kept);
+            out[i] = self.part(run, &kept);
             made.under_way.remove(&keys[i]);
             made.kept.put(keys[i].clone(), kept);
         }
@@ -261,7 +249,6 @@ impl Runs {
     /// answer.
     fn repeat(
         &self,
-        session: &RecordedSession,
         runs: &[&Inner],
         answers: &mut [Result<Vec<f64>, SourceError>],
         took: Duration,
@@ -276,17 +263,17 @@ impl Runs {
         drop(made);
         let run = runs[at];
         let first = std::mem::replace(&mut answers[at], Ok(Vec::new()));
-        let first = first.and_then(|values| self.checked(session, run, values));
+        let first = first.and_then(|values| self.checked(run, values));
         let stage = if self.answers_all { 0 } else { run.stage };
         let again = |first: &[f64], trials: usize| {
             let again = Inner { trials, ..run.clone() };
             let second = self.asked(&[&again]).pop().unwrap_or_else(|| Ok(Vec::new()));
-            let second = self.checked(session, &again, second?)?;
-            repeated::alike(session, stage, [(run.trials, first), (trials, &second)])
+            let second = self.checked(&again, second?)?;
+            repeated::alike(&self.session, stage, [(run.trials, first), (trials, &second)])
         };
         let other = match run.trials {
             own if !run.altered.is_empty() => own,
-            1 => session.trials.len(),
+            1 => self.session.trials.len(),
             _ => 1,
         };
         answers[at] = first.and_then(|first| {
@@ -305,45 +292,40 @@ impl Runs {
     }
 
     /// Checks that an answer holds as many finite numbers as were asked for.
-    fn checked(
-        &self,
-        session: &RecordedSession,
-        run: &Inner,
-        values: Vec<f64>,
-    ) -> Result<Vec<f64>, SourceError> {
-        let samples = session.samples(run.trials);
-        let stages = if self.answers_all { session.stages.len() } else { 1 };
+    fn checked(&self, run: &Inner, values: Vec<f64>) -> Result<Vec<f64>, SourceError> {
+        let samples = self.session.samples(run.trials);
+        let stages = if self.answers_all { self.session.stages.len() } else { 1 };
         let stage =
-            |at: usize| session.stages[if stages > 1 { at } else { run.stage }].name.clone();
+            |at: usize| self.session.stages[if stages > 1 { at } else { run.stage }].name.clone();
         let (found, needed) = (values.len(), stages * samples);
         if found != needed {
             let stage = stage(run.stage);
             return Err(SourceError::Length { stage, found, needed, trials: run.trials });
         }
         let Some(at) = values.iter().position(|x| !x.is_finite()) else {
-            return Ok(self.followed(session, run, values));
+            return Ok(self.followed(run, values));
         };
         let sample = at % samples;
-        let trial = session.trials.iter().find(|t| t.samples.contains(&sample));
+        let trial = self.session.trials.iter().find(|t| t.samples.contains(&sample));
         Err(SourceError::NotFinite {
             stage: stage(at / samples),
             value: values[at],
             trial: trial.map_or(String::new(), |t| t.name.clone()),
-            time_s: trial.map_or(0.0, |t| (sample - t.samples.start) as f64 * session.dt_s),
+            time_s: trial.map_or(0.0, |t| (sample - t.samples.start) as f64 * self.session.dt_s),
         })
     }
 
     /// Unwraps the outputs whose recorded columns wrapped. Each trial begins in the same turn as
     /// the recording.
-    fn followed(&self, session: &RecordedSession, run: &Inner, mut values: Vec<f64>) -> Vec<f64> {
-        let samples = session.samples(run.trials).max(1);
+    fn followed(&self, run: &Inner, mut values: Vec<f64>) -> Vec<f64> {
+        let samples = self.session.samples(run.trials).max(1);
         for (at, answer) in values.chunks_mut(samples).enumerate() {
             let stage = if self.answers_all { at } else { run.stage };
-            let output = &session.stages[stage].output;
-            let Some((turn, record)) = self.turns[stage].zip(session.column(output)) else {
+            let output = &self.session.stages[stage].output;
+            let Some((turn, record)) = self.turns[stage].zip(self.session.column(output)) else {
                 continue;
             };
-            for trial in &session.trials[..run.trials] {
+            for trial in &self.session.trials[..run.trials] {
                 follow_turns(&mut answer[trial.samples.clone()], record[trial.samples.start], turn);
             }
         }

@@ -3,9 +3,13 @@
 use std::ops::Range;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// A recorded session as a source receives it once: everything that stays the same from one run to the next.
-#[derive(Debug, Clone, PartialEq)]
+///
+/// Its serde form is the header of the message `session` of the worker protocol, which states the number of samples of
+/// each trial and omits the values of columns.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RecordedSession {
     /// Sample time, s, the same in every trial.
     pub dt_s: f64,
@@ -23,18 +27,19 @@ pub struct RecordedSession {
 }
 
 /// A trial of a session.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SessionPart {
     /// Its name.
     pub name: String,
     /// Range of its samples among those of all trials end to end.
+    #[serde(with = "number")]
     pub samples: Range<usize>,
     /// Session time of its first sample, s.
     pub start_s: f64,
 }
 
 /// A stage of a session.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SessionStage {
     /// Its name.
     pub name: String,
@@ -45,14 +50,30 @@ pub struct SessionStage {
 }
 
 /// A column of a session.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SessionColumn {
     /// Its name.
     pub name: String,
     /// Unit, empty if none is known.
     pub unit: String,
     /// Values, all trials end to end.
+    #[serde(skip)]
     pub values: Vec<f64>,
+}
+
+/// The number of samples in place of their range.
+mod number {
+    use super::*;
+
+    pub(super) fn serialize<S: Serializer>(range: &Range<usize>, to: S) -> Result<S::Ok, S::Error> {
+        range.len().serialize(to)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(
+        from: D,
+    ) -> Result<Range<usize>, D::Error> {
+        usize::deserialize(from).map(|samples| 0..samples)
+    }
 }
 
 impl RecordedSession {

@@ -2,11 +2,7 @@
 //!
 //! Comments on fields are the descriptions of the keys in the reference of `problem.toml` and in its JSON Schema.
 
-use std::{
-    fmt,
-    num::NonZeroUsize,
-    path::{Path, PathBuf},
-};
+use std::{fmt, num::NonZeroUsize, path::PathBuf};
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{
@@ -53,7 +49,7 @@ pub struct ProblemSpec {
     /// Name of the problem in reports.
     pub name: Option<String>,
     /// Folder to which file names are relative, if it is not the folder of the problem file.
-    #[serde(default, skip_serializing_if = "is_own")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub folder: PathBuf,
     /// The simulator: a command as a list, or the table `[simulator]`.
     #[serde(default, deserialize_with = "simulator")]
@@ -182,7 +178,7 @@ pub struct Parameter {
     pub value: f64,
     /// One standard deviation: a number in the unit of the value, or a share such as `"10 %"`. By default, the value is
     /// exact.
-    #[serde(default, with = "tolerance", skip_serializing_if = "tolerance::is_exact")]
+    #[serde(default, with = "tolerance", skip_serializing_if = "is_default")]
     #[schemars(schema_with = "tolerance::schema")]
     pub tolerance: Tolerance,
     /// Smallest plausible value. By default, the value keeps its sign if its tolerance is relative or smaller than the
@@ -233,7 +229,7 @@ struct WrittenEffect {
     /// Value at which it does nothing; omitted for a shape parameter.
     off: Option<f64>,
     /// Whether it is searched on a logarithmic scale.
-    #[serde(default, skip_serializing_if = "is_false")]
+    #[serde(default, skip_serializing_if = "is_default")]
     log: bool,
     /// Fixed value for every run, if it was found before; `--fix` writes it.
     value: Option<f64>,
@@ -311,7 +307,7 @@ pub struct Argument {
     /// Value at which it does nothing; omitted for a shape parameter, which has the middle of its range while the effect is off.
     pub off: Option<f64>,
     /// Whether it is searched on a logarithmic scale.
-    #[serde(rename = "log", default, skip_serializing_if = "is_false")]
+    #[serde(rename = "log", default, skip_serializing_if = "is_default")]
     pub is_log: bool,
     /// Fixed value for every run, if it was found before; `--fix` writes it.
     pub value: Option<f64>,
@@ -324,27 +320,15 @@ pub struct TrialFile {
     /// File, relative to the problem's folder.
     pub file: String,
     /// Session time of its first sample, s; default: the trial follows the previous one.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub start_s: f64,
     /// `fit`, the default: it may be fitted; `test`: it is used once, for the test at the end.
-    #[serde(default, skip_serializing_if = "is_fit")]
+    #[serde(default, skip_serializing_if = "is_default")]
     pub split: Split,
 }
 
-fn is_own(folder: &Path) -> bool {
-    folder.as_os_str().is_empty()
-}
-
-fn is_false(flag: &bool) -> bool {
-    !flag
-}
-
-fn is_zero(x: &f64) -> bool {
-    *x == 0.0
-}
-
-fn is_fit(split: &Split) -> bool {
-    *split == Split::Fit
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
 }
 
 /// Reads a least and a greatest value.
@@ -418,10 +402,6 @@ mod tolerance {
             Tolerance::Absolute(sd) => to.serialize_f64(*sd),
             Tolerance::Relative(share) => to.collect_str(&format_args!("{} %", 100.0 * share)),
         }
-    }
-
-    pub(super) fn is_exact(tolerance: &Tolerance) -> bool {
-        *tolerance == Tolerance::Exact
     }
 
     pub(super) fn schema(_: &mut SchemaGenerator) -> Schema {

@@ -64,8 +64,8 @@ impl Undeclared {
                 !is_declared && !known.contains_key(&(m.parameter, stage))
             };
             let new: Vec<&Move> = moves.iter().filter(is_new).collect();
-            let output = |run: &Inner| runs.kept(session, &Inner { stage, ..run.clone() });
-            let noise = problem.noise[stage];
+            let output = |run: &Inner| runs.kept(&Inner { stage, ..run.clone() });
+            let noise = problem.recorded[stage].noise.sd();
             let Some(here) = output(at).filter(|_| !new.is_empty() && noise > 0.0) else {
                 continue;
             };

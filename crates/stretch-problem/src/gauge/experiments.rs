@@ -10,7 +10,6 @@ use super::{
 };
 use crate::{
     bench::courses::{Points, begin, course, loops, moving, paced},
-    black_box::velocity::of_position,
     error::ProblemError,
 };
 
@@ -70,14 +69,6 @@ impl GaugeSimulator {
         Ok(vec![signal])
     }
 
-    /// Greatest rate of the recorded reference, outside the test trials.
-    fn fastest(&self) -> f64 {
-        let columns = &self.bench.columns;
-        let rates = of_position(&columns.values[REFERENCE], &columns.ranges, columns.dt_s);
-        let rates = columns.fitted().flat_map(|range| &rates[range]);
-        rates.fold(0.0, |a: f64, rate| a.max(rate.abs()))
-    }
-
     /// A course from the reference and the pressure, each as shares of its range.
     fn course(
         &self,
@@ -112,8 +103,9 @@ impl Laboratory for GaugeSimulator {
 
     fn experiments(&self) -> Vec<(Plan, Course)> {
         let dt_s = self.bench.about.dt_s;
+        let columns = &self.bench.columns;
         // The reference moves no faster than it was recorded.
-        let least_s = self.spec.span.abs() / self.fastest();
+        let least_s = self.spec.span.abs() / columns.fastest(&columns.values[REFERENCE]);
         let most = self.bench.about.trials[0].samples.max((LONGEST_S / dt_s) as usize);
         let moving =
             moving().into_iter().map(|(name, how, points)| (name, how, 0.25, points, false));

@@ -12,34 +12,27 @@ use std::{
 use lru::LruCache;
 use stretch_sim::{ActiveEffect, EffectSet, Grid, PARAMETERS, ParameterInfo, RigParams, RigStage};
 
-/// Pressure at every node or sample, kPa, by trial.
-pub(super) type Pressures = Vec<Vec<f64>>;
+/// Values by trial.
+pub(super) type ByTrial = Vec<Vec<f64>>;
 /// Names of effects, and the bits of all numbers.
 pub(super) type Causes = (Vec<&'static str>, Vec<u64>);
 
-/// Intermediate results, by the causes that they depend on.
-#[derive(Debug, Clone)]
-pub(super) struct RigCache {
-    /// Pressures at every node.
-    pub(super) nodes: LastResults<Causes, Pressures>,
-    /// Simulated pressures at every sample, for recordings without a pressure column.
-    pub(super) samples: LastResults<Causes, Pressures>,
-    /// Lengths without play in the reference, mm, all trials end to end.
-    pub(super) lengths: LastResults<Causes, Vec<f64>>,
+/// What is kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub(super) enum Kept {
+    /// Pressure at every node, kPa.
+    Nodes,
+    /// Simulated pressure at every sample, for recordings without a pressure column, kPa.
+    Samples,
+    /// Length without play in the reference, mm.
+    Lengths,
 }
 
-/// Number of results of each kind that are kept: enough for the probes and steps of the fits under way.
-const MOST: NonZeroUsize = NonZeroUsize::new(12).expect("not 0");
+/// Intermediate results by trial, by the causes that they depend on.
+pub(super) type RigCache = LastResults<(Kept, Causes), ByTrial>;
 
-impl RigCache {
-    pub(super) fn new() -> Self {
-        Self {
-            nodes: LastResults::new(MOST),
-            samples: LastResults::new(MOST),
-            lengths: LastResults::new(MOST),
-        }
-    }
-}
+/// Number of results that are kept: enough for the probes and steps of the fits under way.
+pub(super) const MOST: NonZeroUsize = NonZeroUsize::new(36).expect("not 0");
 
 /// Everything that the outputs of some stages depend on. `others` are the numbers of a run in addition to parameters
 /// and effects.

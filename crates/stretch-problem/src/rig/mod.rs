@@ -118,7 +118,7 @@ impl RigSimulator {
             noises,
             stage_kinds,
             tuned,
-            found: RigCache::new(),
+            found: RigCache::new(cache::MOST),
         })
     }
 

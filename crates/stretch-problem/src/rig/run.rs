@@ -404,8 +404,7 @@ impl Setting<'_> {
         self.each(count, out, |trial, own| {
             let mut length = self.length(trial);
             if let Some(hidden) = &hidden {
-                let hidden = &hidden[self.rig.bench.columns.ranges[trial].clone()];
-                length.iter_mut().zip(hidden).for_each(|(x, h)| *x += h);
+                length.iter_mut().zip(&hidden[trial]).for_each(|(x, h)| *x += h);
             }
             shown.undo(&mut length);
             let pressure = match needs_pressure {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use stretch_sim::{Actuation, Grid, Openings, RigStage, Start};
 
 use super::{
-    cache::{Pressures, causes},
+    cache::{ByTrial, Causes, Kept, causes},
     run::Setting,
 };
 use crate::error::ProblemError;
@@ -18,10 +18,10 @@ impl Setting<'_> {
         &self,
         stage: &Actuation,
         count: usize,
-    ) -> Result<Arc<Pressures>, ProblemError> {
+    ) -> Result<Arc<ByTrial>, ProblemError> {
         let begun = self.begun(count);
         let key = causes(&[RigStage::Pneumatics], &self.params, &self.effects, &self.grid, begun);
-        self.rig.found.nodes.or_make(key, || {
+        self.rig.found.or_make((Kept::Nodes, key), || {
             let mut memory = stage.memory();
             let before = self.before_kpa();
             let shut = Openings { inlet: &[0.0; 2], outlet: &[0.0; 2] };
@@ -38,9 +38,9 @@ impl Setting<'_> {
         })
     }
 
-    /// The part of the length that play in the reference hides. The simulated motion shows which side of the play is in
-    /// contact; the recorded length then gives the length of the muscle.
-    pub(super) fn hidden(&self, count: usize) -> Result<Option<Vec<f64>>, ProblemError> {
+    /// By trial, the part of the length that play in the reference hides. The simulated motion shows which side of the
+    /// play is in contact; the recorded length then gives the length of the muscle.
+    pub(super) fn hidden(&self, count: usize) -> Result<Option<ByTrial>, ProblemError> {
         let alone = self.effects.only(|e| e.hides_input());
         if alone.acting_in(RigStage::Reference).next().is_none() {
             return Ok(None);
@@ -48,18 +48,18 @@ impl Setting<'_> {
         let mut free = self.free_length(count)?.to_vec();
         let mut shown = self.shown(&alone)?;
         shown.condition(&[self.before_mm(); 2])?;
-        self.set_reference_state(&mut shown, free.get(..1).unwrap_or(&[]))?;
-        self.each(count, &mut free, |trial, own| {
-            let before = own.to_vec();
+        let first = free.first().and_then(|trial| trial.get(..1)).unwrap_or(&[]);
+        self.set_reference_state(&mut shown, first)?;
+        for (trial, own) in free.iter_mut().enumerate() {
+            let before = own.clone();
             shown.run(self.start(trial), own)?;
             own.iter_mut().zip(before).for_each(|(shown, free)| *shown = free - *shown);
-            Ok(())
-        })?;
+        }
         Ok(Some(free))
     }
 
     /// Simulated length without play in the reference, mm.
-    fn free_length(&self, count: usize) -> Result<Arc<Vec<f64>>, ProblemError> {
+    fn free_length(&self, count: usize) -> Result<Arc<ByTrial>, ProblemError> {
         let effects = self.effects.only(|e| !e.hides_input());
         let has_pressure = self.rig.inputs.pressure.is_some();
         let grid = if has_pressure {
@@ -68,55 +68,49 @@ impl Setting<'_> {
             effects.grid(&self.params, self.rig.bench.about.dt_s, self.step_s)?
         };
         let initial_share = self.initial_muscle;
-        let without =
-            Setting { rig: self.rig, params: self.params, effects, grid, initial_share, ..*self };
-        let make = || {
-            let mut all = vec![0.0; self.samples(count)];
-            match has_pressure {
-                true => without.muscle(count, &mut all)?,
-                false => without.actuation(count, &mut all)?,
-            }
-            Ok(all)
-        };
-        // A length that depends on a draw of the noise, or on a given input, is needed only once, so it is not cached.
-        if self.input_noise.is_some() || self.given.is_some() {
-            return make().map(Arc::new);
-        }
+        let without = Setting { effects, grid, initial_share, ..*self };
         let stages = [RigStage::Pneumatics, RigStage::Muscle, RigStage::Reference];
         let others = self.begun(count).chain([initial_share]);
         let key = causes(&stages, &without.params, &without.effects, &without.grid, others);
-        self.rig.found.lengths.or_make(key, make)
+        self.kept((Kept::Lengths, key), count, |all| match has_pressure {
+            true => without.muscle(count, all),
+            false => without.actuation(count, all),
+        })
+    }
+
+    /// Pressure of the nominal pneumatics, kPa, for recordings without a pressure column.
+    pub(super) fn simulated_pressure(&self, count: usize) -> Result<Arc<ByTrial>, ProblemError> {
+        let effects = self.rig.bench.effects.clone();
+        let grid = effects.grid(&self.params, self.rig.bench.about.dt_s, self.step_s)?;
+        let others = self.begun(count);
+        let key = causes(&[RigStage::Pneumatics], &self.params, &effects, &grid, others);
+        let nominal = Setting { effects, grid, ..*self };
+        self.kept((Kept::Samples, key), count, |all| nominal.pneumatics(count, all))
+    }
+
+    /// The output of a stage by trial. A result that depends on a draw of the noise, or on a given input, is needed only
+    /// once, so it is not kept.
+    fn kept(
+        &self,
+        key: (Kept, Causes),
+        count: usize,
+        run: impl FnOnce(&mut [f64]) -> Result<(), ProblemError>,
+    ) -> Result<Arc<ByTrial>, ProblemError> {
+        let ranges = &self.rig.bench.columns.ranges[..count];
+        let make = || {
+            let mut all = vec![0.0; ranges.last().map_or(0, |range| range.end)];
+            run(&mut all)?;
+            Ok(ranges.iter().map(|range| all[range.clone()].to_vec()).collect())
+        };
+        match self.input_noise.is_some() || self.given.is_some() {
+            true => make().map(Arc::new),
+            false => self.rig.found.or_make(key, make),
+        }
     }
 
     /// The numbers that a run depends on in addition to parameters and effects: leads of the
     /// commands, and pressures at the start of the first trials.
     fn begun(&self, count: usize) -> impl Iterator<Item = f64> {
         self.leads.into_iter().chain((0..count).map(|trial| self.initial_kpa(trial)))
-    }
-
-    /// Number of samples in the first trials.
-    fn samples(&self, count: usize) -> usize {
-        self.rig.bench.columns.ranges[..count].last().map_or(0, |range| range.end)
-    }
-
-    /// Pressure of the nominal pneumatics, kPa, for recordings without a pressure column.
-    pub(super) fn simulated_pressure(&self, count: usize) -> Result<Arc<Pressures>, ProblemError> {
-        let effects = &self.rig.bench.effects;
-        let grid = effects.grid(&self.params, self.rig.bench.about.dt_s, self.step_s)?;
-        let nominal = Setting { rig: self.rig, effects: effects.clone(), grid, ..*self };
-        let make = || {
-            let mut all = vec![0.0; self.samples(count)];
-            nominal.pneumatics(count, &mut all)?;
-            let ranges = self.rig.bench.columns.ranges[..count].iter();
-            Ok(ranges.map(|range| all[range.clone()].to_vec()).collect())
-        };
-        // If the chamber depends on the length, it depends on the draw of its noise and on a given
-        // length.
-        if self.input_noise.is_some() || self.given.is_some() {
-            return make().map(Arc::new);
-        }
-        let others = self.begun(count);
-        let key = causes(&[RigStage::Pneumatics], &nominal.params, effects, &nominal.grid, others);
-        self.rig.found.samples.or_make(key, make)
     }
 }

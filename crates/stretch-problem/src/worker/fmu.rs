@@ -30,14 +30,14 @@ impl WorkersSpec {
         folder: impl Into<PathBuf>,
     ) -> Result<Self, ProblemError> {
         let missing = || {
-            ProblemError::Simulator(format!(
+            ProblemError::Refused(format!(
                 "{file}: FMUs are run by the program {PROGRAM}, which is neither next to this program nor on the path; build it with \
                  cargo build --release -p stretch-fmu, and set {VARIABLE} to target/release/{PROGRAM}"
             ))
         };
         let program = program().ok_or_else(missing)?;
         let program = program.to_str().ok_or_else(|| {
-            ProblemError::Simulator(format!("{}: its name is not UTF-8", program.display()))
+            ProblemError::Refused(format!("{}: its name is not UTF-8", program.display()))
         })?;
         let pair = |option: &str, (name, value): (&String, &str)| {
             [option.to_owned(), format!("{name}={value}")]

@@ -107,24 +107,29 @@ pub(super) fn session(session: &RecordedSession) -> Vec<u8> {
 
 /// The header of the message `session`: the session as a simulator receives it once, without the values of the columns.
 pub fn session_header(session: &RecordedSession) -> Value {
-    let trials = session
-        .trials
-        .iter()
-        .map(|t| json!({ "name": t.name, "samples": t.samples.len(), "start_s": t.start_s }));
-    let stages = session
-        .stages
-        .iter()
-        .map(|s| json!({ "inputs": s.inputs, "name": s.name, "output": s.output }));
-    let columns = session.columns.iter().map(|c| json!({ "name": c.name, "unit": c.unit }));
-    json!({
-        "columns": columns.collect::<Vec<_>>(),
-        "dt_s": session.dt_s,
-        "effects": session.effects,
-        "kind": "session",
-        "parameters": session.parameters,
-        "stages": stages.collect::<Vec<_>>(),
-        "trials": trials.collect::<Vec<_>>(),
-    })
+    // Every key is a string, so that this does not fail.
+    let mut header = serde_json::to_value(session).unwrap_or_default();
+    header["kind"] = "session".into();
+    header
+}
+
+/// Reads the message `session`; `None` if its header or its body is incomplete.
+pub fn read_session(frame: &WorkerFrame) -> Option<RecordedSession> {
+    let header = Value::Object(frame.header.clone());
+    let mut session: RecordedSession = serde_json::from_value(header).ok()?;
+    let mut end = 0_usize;
+    for trial in &mut session.trials {
+        let from = end;
+        end = end.checked_add(trial.samples.len())?;
+        trial.samples = from..end;
+    }
+    let mut rest = frame.body.as_slice();
+    for column in &mut session.columns {
+        let (values, behind) = rest.split_at_checked(end)?;
+        column.values = values.to_vec();
+        rest = behind;
+    }
+    Some(session)
 }
 
 /// Reads the answer to the session; its `notes`, a list of sentences, may be left out.

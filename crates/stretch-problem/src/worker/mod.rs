@@ -10,5 +10,5 @@ mod pool;
 mod process;
 
 pub use frame::{FrameError, PREFIX, Prefix, WorkerFrame};
-pub use message::session_header;
+pub use message::{read_session, session_header};
 pub use pool::{Workers, WorkersSpec};

@@ -149,7 +149,7 @@ impl Workers {
     /// A command that cannot be started, a worker that does not say hello or takes another unit than the problem.
     pub fn start(spec: WorkersSpec, session: &RecordedSession) -> Result<Self, ProblemError> {
         let named =
-            |why: String| ProblemError::Simulator(format!("simulator {}: {why}", spec.shown()));
+            |why: String| ProblemError::Refused(format!("simulator {}: {why}", spec.shown()));
         let begun = spec.guard().and_then(|()| begin(&spec, session));
         let (process, hello, session_notes) = begun.map_err(named)?;
         let crew = Mutex::new(Crew { idle: vec![process], busy: 0 });

@@ -12,7 +12,7 @@ use stretch_gap::EffectSpec;
 
 use crate::{
     bench::columns::Columns,
-    black_box::{StageEntry, begins::Before},
+    black_box::{StageEntry, checked::StageRecord},
     error::ProblemError,
 };
 
@@ -56,13 +56,9 @@ pub(crate) struct Placed {
 /// Columns, stages and kinds among which wrappers are placed.
 pub(crate) struct Among<'a> {
     pub(crate) columns: &'a Columns,
-    /// By stage, the commands with which the operators in front of it begin each trial.
-    pub(crate) before: &'a [Before],
     pub(crate) stages: &'a [StageEntry],
-    /// By stage, the velocity of its parts with friction.
-    pub(crate) velocities: &'a [Option<Vec<f64>>],
-    /// By stage, the position of its parts with friction.
-    pub(crate) positions: &'a [Option<Vec<f64>>],
+    /// By stage, what its recordings show.
+    pub(crate) recorded: &'a [StageRecord],
     /// By stage, whether it names the velocity or the position of its parts with friction.
     /// Otherwise its output is used.
     pub(crate) names_motion: Vec<bool>,
@@ -159,30 +155,27 @@ fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
     // `load_friction(load_N)` is friction, too
     let kind = pattern.split('(').next().unwrap_or(pattern);
     let is_friction = kind.ends_with("friction") || kind.ends_with("torque_speed_limit");
-    if is_friction && among.velocities.iter().all(Option::is_none) {
+    if is_friction && among.recorded.iter().all(|stage| stage.velocity.is_none()) {
         return ProblemError::value(
             format!("wrap, {pattern}"),
             "no stage names the velocity at which friction acts",
             "give the stage velocity = \"COLUMN\", or position = \"COLUMN\", from which the velocity is computed",
         );
     }
+    // 50 names would hide what to do
+    let place = |p: &Placed| Some(format!("{}KIND", &p.name[..p.name.rfind(p.kind.name)?]));
+    let distinct = |mut names: Vec<String>| {
+        let mut seen = BTreeSet::new();
+        names.retain(|name| seen.insert(name.clone()));
+        names.join(", ")
+    };
+    let known = format!(
+        "all, {}, with the kinds {}",
+        distinct(all.iter().filter_map(place).collect()),
+        distinct(all.iter().map(|p| p.kind.name.to_owned()).collect())
+    );
     let names = all.iter().map(|p| p.name.as_str()).chain(["all"]);
-    let mut error = ProblemError::unknown("wrap", "wrapper", pattern, names);
-    if let ProblemError::Unknown { known, .. } = &mut error {
-        // 50 names would hide what to do
-        let place = |p: &Placed| Some(format!("{}KIND", &p.name[..p.name.rfind(p.kind.name)?]));
-        let distinct = |mut names: Vec<String>| {
-            let mut seen = BTreeSet::new();
-            names.retain(|name| seen.insert(name.clone()));
-            names.join(", ")
-        };
-        *known = format!(
-            "all, {}, with the kinds {}",
-            distinct(all.iter().filter_map(place).collect()),
-            distinct(all.iter().map(|p| p.kind.name.to_owned()).collect())
-        );
-    }
-    error
+    ProblemError::unknown_among("wrap", ("wrapper", pattern), names, &known)
 }
 
 fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
@@ -193,7 +186,8 @@ fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
     let begun = |range: Range<usize>| {
         let trial = trials.iter().position(|all| all.start == range.start);
         let before = trial.filter(|_| site.side == Side::Input);
-        let before = before.and_then(|trial| *among.before[site.stage].get(trial)?);
+        let before =
+            before.and_then(|trial| *among.recorded[site.stage].begins.before.get(trial)?);
         before.into_iter().chain(values[range].iter().copied()).collect()
     };
     let looked: Vec<Vec<f64>> = among.columns.looked_at().into_iter().map(begun).collect();
@@ -259,8 +253,8 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
             // the other column causes the crosstalk, and also distinguishes the wrappers by name
             return each.map(|(x, name)| with(Some(x), Some((x, name)))).collect();
         }
-        Beside::Velocity | Beside::VelocityAndLoad => &among.velocities[site.stage],
-        Beside::Position | Beside::PositionAndLoad => &among.positions[site.stage],
+        Beside::Velocity | Beside::VelocityAndLoad => &among.recorded[site.stage].velocity,
+        Beside::Position | Beside::PositionAndLoad => &among.recorded[site.stage].position,
     };
     let is_rubbed = |x: &&[f64]| site.is_force() && moves(x);
     let Some(rubs) = rubs.as_deref().filter(is_rubbed) else { return Vec::new() };
@@ -278,7 +272,7 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
 fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<String> {
     let stage = &among.stages[site.stage].name;
     let own = || sites.iter().filter(|other| other.stage == site.stage);
-    let rubs = among.velocities[site.stage].as_ref();
+    let rubs = among.recorded[site.stage].velocity.as_ref();
     let moves = |s: &Site| {
         s.side == Side::Output
             && s.quantity.is_some_and(|q| q.is_position() || q == Measured::Speed)

@@ -4,10 +4,7 @@ use std::{f64::consts::TAU, path::Path};
 
 use stretch_data::{Remarks, RigFile, in_digits};
 use stretch_effects::EffectParameter;
-use stretch_gap::{
-    Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Model, Run, SampleRoles, Simulator,
-    VerdictKind,
-};
+use stretch_gap::{Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Model, VerdictKind};
 use stretch_sim::{Effect, SimError, Tolerance};
 
 use crate::black_box::ProblemSpec;
@@ -251,55 +248,6 @@ fn of_unit(unit: &str) -> String {
     if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
-/// Replaces the amplitude and phase of an effect's spectral line by values from the recording, as a
-/// diagnosis does. They are the amplitude and phase of the residual of the model without the
-/// effect, over the samples outside the test samples. An effect without a line keeps its values.
-/// `place` is the stage that shows the line, and the size of a unit amplitude in units of that
-/// stage's output.
-pub(crate) fn with_line(
-    simulator: &dyn Simulator,
-    place: (usize, f64),
-    rows: &[&'static Effect],
-    model: &Model,
-    (effect, values): (&Effect, Vec<f64>),
-) -> Vec<f64> {
-    let found = found_line(simulator, place, rows, model, (effect, &values));
-    match (found, &values[..]) {
-        (Some([amplitude, phase]), [_, rest @ ..]) => [&[amplitude], rest, &[phase]].concat(),
-        _ => values,
-    }
-}
-
-/// Amplitude and phase of an effect's spectral line.
-fn found_line(
-    simulator: &dyn Simulator,
-    place: (usize, f64),
-    rows: &[&'static Effect],
-    model: &Model,
-    (effect, values): (&Effect, &[f64]),
-) -> Option<[f64; 2]> {
-    let line = effect.line(values)?;
-    let (stage, unit) = place;
-    let is_other = |(index, _): &&(usize, Vec<f64>)| rows[*index].name != effect.name;
-    let without = Model {
-        effects: model.effects.iter().filter(is_other).cloned().collect(),
-        ..model.clone()
-    };
-    let (trials, measured) = (simulator.trials(), simulator.measured(stage));
-    let mut simulated = vec![0.0; measured.len()];
-    let run = Run::exact(stage, &without, trials.len());
-    simulator.simulate(run, &mut simulated).ok()?;
-    let mut begin = 0;
-    let mut left = Vec::new();
-    for (trial, fit) in trials.iter().zip(SampleRoles::not_tested(trials)) {
-        let at = |i: usize| trial.start_s + i as f64 * simulator.dt_s();
-        let apart = |i: usize| (measured[begin + i] - simulated[begin + i]) / unit;
-        left.extend((0..fit).map(|i| (at(i), apart(i))));
-        begin += trial.samples;
-    }
-    Some(sine(line.hertz, &left))
-}
-
 /// Time over which the phase of the mains is assumed constant, s.
 const STEADY_S: f64 = 1.0;
 
@@ -309,7 +257,7 @@ const STEADY_S: f64 = 1.0;
 /// all samples.
 ///
 /// If the sample rate is twice the frequency, one quadrature cannot be observed and counts as zero.
-fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {
+pub(crate) fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {
     let of = |part: &[(f64, f64)]| -> [f64; 2] {
         let mut sums = [0.0; 5];
         for (t, r) in part {

@@ -4,12 +4,14 @@
 use std::fmt::Debug;
 
 use stretch_data::{Remarks, RigFile};
-use stretch_gap::{Diagnosis, Evidence, GapError, Laboratory, Model, Proposal, next_experiment};
+use stretch_gap::{
+    Diagnosis, Evidence, GapError, Laboratory, Model, Proposal, Run, next_experiment,
+};
 use stretch_sim::{Effect, EffectSet, Grid, Surroundings};
 
 use super::Bench;
 use crate::{
-    fix::{Chosen, Fix, Fixed, NoFix, names, with_line},
+    fix::{Chosen, Fix, Fixed, NoFix, names, sine},
     implement::Implementation,
     problem::Diagnosable,
 };
@@ -48,10 +50,27 @@ pub(crate) trait BuiltIn: Laboratory {
     }
 }
 
-/// Values of an effect with the amplitude and phase of its spectral line from the recording.
+/// Replaces the amplitude and phase of an effect's spectral line by values from the recording, as a
+/// diagnosis does. They are the amplitude and phase of the residual of the model without the
+/// effect, over the samples outside the test samples. An effect without a line keeps its values.
 fn complete<B: BuiltIn>(own: &B, model: &Model, effect: &Effect, values: Vec<f64>) -> Vec<f64> {
-    let Bench { sensor, rows, .. } = own.bench();
-    with_line(own, (*sensor, own.line_unit(model)), rows, model, (effect, values))
+    let Bench { about, columns, rows, sensor, .. } = own.bench();
+    let Some(line) = effect.line(&values) else { return values };
+    let mut without = model.clone();
+    without.effects.retain(|(index, _)| rows[*index].name != effect.name);
+    let (measured, unit) = (own.measured(*sensor), own.line_unit(model));
+    let mut simulated = vec![0.0; measured.len()];
+    let run = Run::exact(*sensor, &without, about.trials.len());
+    if own.simulate(run, &mut simulated).is_err() {
+        return values;
+    }
+    let mut left = Vec::new();
+    for (trial, range) in about.trials.iter().zip(columns.fitted()) {
+        let at = |i: usize| trial.start_s + (i - range.start) as f64 * about.dt_s;
+        left.extend(range.clone().map(|i| (at(i), (measured[i] - simulated[i]) / unit)));
+    }
+    let [amplitude, phase] = sine(line.hertz, &left);
+    [&[amplitude], values.get(1..).unwrap_or(&[]), &[phase]].concat()
 }
 
 impl<B: BuiltIn + Debug + Send> Diagnosable for B {

@@ -6,12 +6,13 @@ mod built_in;
 pub(crate) mod columns;
 pub(crate) mod courses;
 pub(crate) mod isolated_outliers;
-pub(crate) mod rig_file;
 pub(crate) mod shortened;
 pub(crate) mod smooth;
 mod specs;
-mod undetermined;
 
+use std::path::Path;
+
+use stretch_data::RigFile;
 use stretch_gap::{Description, DescriptionSpec, Line, Model, ParameterSpec, StageSpec};
 use stretch_sim::{Effect, EffectSet, Measured, SimError};
 
@@ -119,4 +120,13 @@ pub(crate) fn straight_line<I: Iterator<Item = (f64, f64)>>(
     });
     let slope = if xx > 0.0 && xy != 0.0 { xy / xx } else { flat };
     (mean_y - slope * mean_x, slope)
+}
+
+/// Reads a rig file as one kind of rig; an error names the file.
+pub(crate) fn read_rig<T>(
+    path: &Path,
+    read: fn(&RigFile) -> Result<T, SimError>,
+) -> Result<T, ProblemError> {
+    let refused = |cause| ProblemError::Refused(format!("{}: {cause}", path.display()));
+    read(&RigFile::read(path)?).map_err(refused)
 }

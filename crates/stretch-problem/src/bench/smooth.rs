@@ -36,32 +36,16 @@ pub(crate) struct Smoothed {
     corners: Vec<(usize, f64)>,
 }
 
-/// Sums of x^2 and x^4 over -h .. h, and the number of samples.
-const fn moments(h: usize) -> (f64, f64, f64) {
-    let (mut squares, mut fourths, mut i) = (0.0, 0.0, 1);
-    while i <= h {
-        let square = (i * i) as f64;
-        squares += square;
-        fourths += square * square;
-        i += 1;
-    }
-    (2.0 * squares, 2.0 * fourths, (2 * h + 1) as f64)
+/// Sums of x^2 and x^4 over x = -h .. h, and the number of samples.
+fn moments(h: usize) -> (f64, f64, f64) {
+    let h = h as f64;
+    let squares = h * (h + 1.0) * (2.0 * h + 1.0) / 3.0;
+    (squares, squares * (3.0 * h * h + 3.0 * h - 1.0) / 5.0, 2.0 * h + 1.0)
 }
-
-/// [`moments`] of every half-width.
-static MOMENTS: [(f64, f64, f64); WIDEST + 1] = {
-    let mut all = [(0.0, 0.0, 0.0); WIDEST + 1];
-    let mut h = 0;
-    while h <= WIDEST {
-        all[h] = moments(h);
-        h += 1;
-    }
-    all
-};
 
 /// Residual sum of squares of the parabola around sample `i`.
 fn left_by_parabola(record: &[f64], i: usize, h: usize) -> f64 {
-    let (s2, s4, n) = MOMENTS[h];
+    let (s2, s4, n) = moments(h);
     let middle = record[i];
     let (mut y0, mut y1, mut y2, mut yy) = (0.0, 0.0, 0.0, 0.0);
     for (k, value) in record[i - h..=i + h].iter().enumerate() {
@@ -176,7 +160,7 @@ const LANES: usize = 4;
 /// Value of the least-squares parabola in the middle of a window of 2 h + 1 samples: sum over k of
 /// (s4 - s2 k^2)/(n s4 - s2^2) y_k, k from -h to h.
 fn middle_of(window: &[f64], h: usize) -> f64 {
-    let (s2, s4, n) = MOMENTS[h];
+    let (s2, s4, n) = moments(h);
     let (middle, scale) = (window[h], 1.0 / (n * s4 - s2 * s2));
     let term = |k: usize, y: f64| {
         let x = k as f64 - h as f64;

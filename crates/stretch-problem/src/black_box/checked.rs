@@ -43,8 +43,6 @@ pub struct Checked {
     /// The entries of the problem, without the recordings.
     pub(crate) spec: ProblemSpec,
     pub(crate) grid: Grid,
-    /// Samples and session time of each trial, s, from the session's start.
-    pub(crate) parts: Vec<(Range<usize>, f64)>,
     pub(crate) notes: Vec<String>,
 }
 
@@ -111,7 +109,6 @@ impl Checked {
             about: about.with_record(known)?,
             session: Arc::new(session),
             recorded,
-            parts: parts(&columns),
             columns,
             by,
             wrappers,
@@ -261,13 +258,6 @@ fn begins_note(recorded: &[StageRecord], wrappers: &[Placed]) -> Option<String> 
         "{column} steps at the first sample of {trials} trial{s}, but its value before the step is unknown, so an effect with memory in \
          front of the stage begins with the step; record some rest before it"
     ))
-}
-
-/// Samples and session time of each trial, s, from the session's start.
-fn parts(columns: &Columns) -> Vec<(Range<usize>, f64)> {
-    let begun_s = columns.trials.first().map_or(0.0, |t| t.start_s);
-    let starts = columns.trials.iter().map(|t| t.start_s - begun_s);
-    columns.ranges.iter().cloned().zip(starts).collect()
 }
 
 /// Names of the columns that are used, each once.

@@ -63,7 +63,7 @@ pub(super) fn probes(problem: &Checked, source: &dyn Source) -> Vec<Altered> {
 /// A column, altered by the wrapper in front of it that changes it most at its start values; `None`
 /// if no wrapper alters it.
 fn probe(problem: &Checked, stage: usize, input: usize) -> Option<Altered> {
-    let trials = Trials { grid: &problem.grid, parts: &problem.parts };
+    let trials = Trials { grid: &problem.grid, parts: &problem.session().trials };
     let mut columns: Vec<Vec<f64>> = problem.stage_inputs(stage).map(<[f64]>::to_vec).collect();
     let mut most = (0.0, Vec::new(), Vec::new());
     for (at, wrapper) in acting(problem).filter(|(_, w)| is_at(w, stage, input)) {

@@ -9,7 +9,6 @@ mod facts;
 mod fixed;
 mod inner_run;
 mod linear;
-mod repeated;
 mod runs;
 pub(crate) mod source;
 pub(crate) mod spec;
@@ -197,7 +196,7 @@ impl BlackBox {
     }
 
     fn trials_of(&self) -> Trials<'_> {
-        Trials { grid: &self.problem.grid, parts: &self.problem.parts }
+        Trials { grid: &self.problem.grid, parts: &self.problem.session().trials }
     }
 
     /// Applies the wrappers behind a stage to its output.

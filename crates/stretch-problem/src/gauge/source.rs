@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use stretch_data::{DataSet, SessionTrial, Trial};
+use stretch_data::{DataSet, RigFile, SessionTrial, Trial};
 use stretch_recording::{ReadOptions, Recording};
-use stretch_sim::Catalogue;
+use stretch_sim::{Catalogue, GaugeRig};
 
 use super::{GaugeSetup, GaugeSimulator};
-use crate::{bench::rig_file, error::ProblemError};
+use crate::{bench::read_rig, error::ProblemError};
 
 /// Reference and signal if no columns are named.
 const USUAL: (&str, &str) = ("length_mm", "bridge_v");
@@ -31,9 +31,11 @@ impl GaugeSimulator {
     ) -> Result<Option<Self>, ProblemError> {
         let set = if path.is_dir() { Some(DataSet::read(path)?) } else { None };
         let own = set.as_ref().and_then(|set| Some(path.join(set.rig.as_ref()?)));
+        let is_gauge =
+            |path: &Path| RigFile::read(path).map(|file| file.kind.as_deref() == Some("gauge"));
         let (rig, says_so) = match (rig, &own) {
-            (Some(rig), _) => (Some(rig), rig_file::is_gauge(rig)?),
-            (None, Some(own)) if rig_file::is_gauge(own)? => (Some(own.as_path()), true),
+            (Some(rig), _) => (Some(rig), is_gauge(rig)?),
+            (None, Some(own)) if is_gauge(own)? => (Some(own.as_path()), true),
             _ => (None, false),
         };
         let mut options = recorded.clone();
@@ -55,7 +57,7 @@ impl GaugeSimulator {
                 Recording::session(set, path, &options)?
             }
         };
-        let rig = rig.map(rig_file::gauge).transpose()?;
+        let rig = rig.map(|path| read_rig(path, GaugeRig::from_file)).transpose()?;
         let rig = rig.as_ref();
         Self::new(&GaugeSetup { trials: &trials, reference, signal, rig, catalogue }).map(Some)
     }

@@ -9,17 +9,15 @@ mod fixed;
 mod noises;
 mod nominal;
 mod rails;
-mod record_columns;
-mod reference_sensor;
 mod run;
 mod session;
-mod simulator;
 mod stand_ins;
 mod timing;
 
 use std::path::Path;
 
 use stretch_data::DataSet;
+use stretch_gap::{Description, Distortion, GapError, Line, Model, Run, Simulator};
 use stretch_recording::ReadOptions;
 use stretch_sim::{
     Bridge, Catalogue, Effect, Extent, Key, Place as EffectPlace, Rig, RigParams, RigStage, Search,
@@ -34,7 +32,7 @@ pub use session::RigSession;
 use session::{Inputs, VOLTAGE};
 
 use crate::{
-    bench::{Bench, Place, columns::Columns, rig_file},
+    bench::{Bench, Place, columns::Columns, read_rig, smooth::MeasuredInput},
     error::ProblemError,
 };
 
@@ -78,7 +76,11 @@ impl RigSimulator {
     ) -> Result<Self, ProblemError> {
         let set = DataSet::read(folder)?;
         let own = set.rig.as_ref().map(|file| folder.join(file));
-        let rig = rig.or(own.as_deref()).map(rig_file::rig).transpose()?.unwrap_or_default();
+        let rig = rig
+            .or(own.as_deref())
+            .map(|path| read_rig(path, Rig::from_file))
+            .transpose()?
+            .unwrap_or_default();
         let session = RigSession::read(folder, &set, recorded)?;
         Self::new(RigSetup { session, rig, catalogue })
     }
@@ -130,6 +132,49 @@ impl RigSimulator {
     /// Nominal parameters as shipped.
     pub fn nominal(&self) -> &RigParams {
         &self.base
+    }
+}
+
+impl Simulator for RigSimulator {
+    fn description(&self) -> &Description {
+        &self.bench.about
+    }
+
+    fn measured(&self, stage: usize) -> &[f64] {
+        self.bench.measured(stage)
+    }
+
+    fn simulate(&self, run: Run<'_>, out: &mut [f64]) -> Result<(), GapError> {
+        Ok(run::simulate(self, run, None, out)?)
+    }
+
+    fn input(&self, stage: usize) -> Option<Vec<f64>> {
+        match self.stage_kinds[stage] {
+            RigStage::Muscle => self.inputs.pressure.as_ref().map(MeasuredInput::values),
+            RigStage::Sensing => Some(self.inputs.length.values()),
+            _ => None,
+        }
+    }
+
+    fn simulate_on(&self, run: Run<'_>, input: &[f64], out: &mut [f64]) -> Result<bool, GapError> {
+        if self.input(run.stage).is_none() {
+            return Ok(false);
+        }
+        run::simulate(self, run, Some(input), out)?;
+        Ok(true)
+    }
+
+    fn corrected(
+        &self,
+        column: &str,
+        error: Distortion,
+    ) -> Result<Option<Box<dyn Simulator + Send + '_>>, GapError> {
+        let rig = self.with_corrected(column, error);
+        Ok(rig.map(|rig| Box::new(rig) as Box<dyn Simulator + Send>))
+    }
+
+    fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
+        if stage == self.bench.sensor { self.bench.lines(model) } else { Vec::new() }
     }
 }
 

@@ -123,6 +123,7 @@ pub(super) fn stages(
 }
 
 /// The parameters of a model, sorted by what they set.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct TunedRig {
     pub(super) params: RigParams,
     /// Offset of the pressure at a trial's start, standard deviations.

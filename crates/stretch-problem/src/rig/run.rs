@@ -5,13 +5,10 @@ use std::{borrow::Cow, sync::Arc};
 use stretch_gap::Run;
 use stretch_sim::{
     Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Need, Openings, Pneumatics,
-    RigParams, RigStage, Sensing, Start,
+    Reference, RigParams, RigStage, Sensing, Start,
 };
 
-use super::{
-    RigSimulator, nominal::TunedRig, reference_sensor::ReferenceSensor, session::Begin, timing,
-    timing::Leads,
-};
+use super::{RigSimulator, nominal::TunedRig, session::Begin, timing};
 use crate::{
     bench::{Acting, finite, smooth::cubic},
     error::ProblemError,
@@ -35,17 +32,13 @@ const MOVING_KPA: f64 = 10.0;
 /// Everything that a run needs in addition to the rig.
 pub(super) struct Setting<'a> {
     pub(super) rig: &'a RigSimulator,
-    pub(super) params: RigParams,
+    pub(super) tuned: TunedRig,
     pub(super) effects: EffectSet,
     /// Step of integration of stages that commands drive, s.
     pub(super) step_s: f64,
     pub(super) grid: Grid,
-    pub(super) offset: f64,
-    pub(super) leads: Leads,
     /// Share of the settled state in the initial state of the stage, 0 to 1.
     pub(super) initial_share: f64,
-    /// Share of the settled state in the initial state of the muscle, 0 to 1.
-    pub(super) initial_muscle: f64,
     pub(super) input_noise: Option<u64>,
     /// Input of the stage that replaces the measured one, all trials end to end.
     pub(super) given: Option<&'a [f64]>,
@@ -61,8 +54,8 @@ pub(super) fn simulate(
 ) -> Result<(), ProblemError> {
     let kind = rig.stage_kinds[run.stage];
     let tuned = TunedRig::of(&rig.base, &rig.tuned, run.model);
-    let TunedRig { params, offset, leads, initial_muscle, initial_gauge } = tuned;
-    let initial_share = if kind == RigStage::Sensing { initial_gauge } else { initial_muscle };
+    let is_sensor = kind == RigStage::Sensing;
+    let initial_share = if is_sensor { tuned.initial_gauge } else { tuned.initial_muscle };
     let acting = rig.bench.acting(run.model)?;
     let dt_s = rig.bench.about.dt_s;
     let step_s = run.step * STEP_S;
@@ -73,18 +66,15 @@ pub(super) fn simulate(
             let pieces = if is_fine { PIECES } else { 1.0 };
             Grid::new(dt_s, run.step.min(1.0) * dt_s / pieces, 0.0)?
         }
-        _ => acting.inside.grid(&params, dt_s, step_s)?,
+        _ => acting.inside.grid(&tuned.params, dt_s, step_s)?,
     };
     let setting = Setting {
         rig,
-        params,
+        tuned,
         effects: acting.inside.clone(),
         step_s,
         grid,
-        offset,
-        leads,
         initial_share,
-        initial_muscle,
         input_noise: run.input_noise,
         given,
         kind,
@@ -169,9 +159,12 @@ impl Setting<'_> {
     ) -> Result<(), ProblemError> {
         let ReferenceSensor { stage, memory, .. } = shown;
         let mut out = vec![0.0; length.len()];
-        self.set_initial_state(self.initial_muscle, memory, stage.memory(), |memory, start| {
-            Ok(stage.run(memory, start, length, &mut out)?)
-        })
+        self.set_initial_state(
+            self.tuned.initial_muscle,
+            memory,
+            stage.memory(),
+            |memory, start| Ok(stage.run(memory, start, length, &mut out)?),
+        )
     }
 
     fn is_vented(&self) -> bool {
@@ -183,7 +176,7 @@ impl Setting<'_> {
     /// Pressure before the session, kPa: a muscle that begins vented was filled before, and a
     /// muscle that begins filled was vented.
     pub(super) fn before_kpa(&self) -> f64 {
-        if self.is_vented() { 1e-3 * self.params[Key::PS] } else { 0.0 }
+        if self.is_vented() { 1e-3 * self.tuned.params[Key::PS] } else { 0.0 }
     }
 
     /// Length before the session, mm.
@@ -193,23 +186,23 @@ impl Setting<'_> {
     }
 
     pub(super) fn initial_kpa(&self, trial: usize) -> f64 {
-        let supply = 1e-3 * self.params[Key::PS];
+        let supply = 1e-3 * self.tuned.params[Key::PS];
         match self.rig.inputs.begin[trial] {
-            Begin::Empty => EMPTY_KPA.0 + self.offset * EMPTY_KPA.1,
-            Begin::Full => supply * (1.0 - FULL_SHARE.0 + self.offset * FULL_SHARE.1),
-            Begin::Pressure(kpa, sd) => kpa + self.offset * sd,
-            Begin::Length(mm) => self.static_kpa(mm) + LENGTH_KPA * self.offset,
+            Begin::Empty => EMPTY_KPA.0 + self.tuned.offset * EMPTY_KPA.1,
+            Begin::Full => supply * (1.0 - FULL_SHARE.0 + self.tuned.offset * FULL_SHARE.1),
+            Begin::Pressure(kpa, sd) => kpa + self.tuned.offset * sd,
+            Begin::Length(mm) => self.static_kpa(mm) + LENGTH_KPA * self.tuned.offset,
             // The muscle lags behind its pressure: tau L' = L_static - L.
             Begin::Moving(mm, mm_per_s) => {
-                let ahead = mm + self.params[Key::TauM] * mm_per_s;
-                self.static_kpa(ahead) + MOVING_KPA * self.offset
+                let ahead = mm + self.tuned.params[Key::TauM] * mm_per_s;
+                self.static_kpa(ahead) + MOVING_KPA * self.tuned.offset
             }
         }
     }
 
     /// Pressure at which the muscle rests at a length, kPa.
     fn static_kpa(&self, mm: f64) -> f64 {
-        let p = &self.params;
+        let p = &self.tuned.params;
         let x = (1.0 - mm / p[Key::L0]) / p[Key::KMax];
         let law = p[Key::A0] * (1.0 - (-p[Key::A1] * x).exp()) * (p[Key::A3] * x * x).exp();
         (1e-3 * p[Key::PRef] * law).max(0.0)
@@ -219,7 +212,7 @@ impl Setting<'_> {
     pub(super) fn openings(&self, trial: usize) -> [Cow<'_, [f64]>; 2] {
         let range = &self.rig.bench.columns.ranges[trial];
         let [inlet, outlet] = self.rig.inputs.openings.each_ref().map(|all| &all[range.clone()]);
-        timing::ahead(inlet, outlet, self.leads)
+        timing::ahead(inlet, outlet, self.tuned.leads)
     }
 
     /// The measured length, smoothed, with a random draw of its noise if the run requests one; the given input if the
@@ -257,7 +250,7 @@ impl Setting<'_> {
     }
 
     pub(super) fn pneumatics(&self, count: usize, out: &mut [f64]) -> Result<(), ProblemError> {
-        let stage = Pneumatics::new(&self.params, &self.effects, &self.grid)?;
+        let stage = Pneumatics::new(&self.tuned.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         self.each(count, out, |trial, own| {
             let (start, [inlet, outlet]) = (self.after_pause(trial), self.openings(trial));
@@ -274,7 +267,7 @@ impl Setting<'_> {
     }
 
     pub(super) fn muscle(&self, count: usize, out: &mut [f64]) -> Result<(), ProblemError> {
-        let stage = Muscle::new(&self.params, &self.effects, &self.grid)?;
+        let stage = Muscle::new(&self.tuned.params, &self.effects, &self.grid)?;
         let before = self.before_kpa();
         let pressure = |trial: usize| self.pressure(trial).unwrap_or_default();
         self.lengths(
@@ -293,7 +286,7 @@ impl Setting<'_> {
     }
 
     pub(super) fn actuation(&self, count: usize, out: &mut [f64]) -> Result<(), ProblemError> {
-        let stage = Actuation::new(&self.params, &self.effects, &self.grid)?;
+        let stage = Actuation::new(&self.tuned.params, &self.effects, &self.grid)?;
         let before = self.before_kpa();
         if !stage.is_coupled() {
             let pressure = self.chamber_kpa(&stage, count)?;
@@ -360,7 +353,7 @@ impl Setting<'_> {
         acting: &Acting<'_>,
         out: &mut [f64],
     ) -> Result<(), ProblemError> {
-        let stage = Sensing::new(&self.params, &self.effects, &self.grid)?;
+        let stage = Sensing::new(&self.tuned.params, &self.effects, &self.grid)?;
         let mut memory = stage.memory();
         let shown = self.shown(&self.effects.only(|e| !e.hides_input()))?;
         let needs_pressure = self
@@ -424,7 +417,7 @@ impl Setting<'_> {
     /// otherwise `None`. All trials share the memory of the gauge.
     fn dimmed(&self, count: usize) -> Result<Vec<Option<Sensing>>, ProblemError> {
         let one = |excitation: &f64| {
-            let mut params = self.params;
+            let mut params = self.tuned.params;
             params[Key::VExc] *= excitation;
             let stage = || Ok(Sensing::new(&params, &self.effects, &self.grid)?);
             (*excitation != 1.0).then(stage).transpose()
@@ -445,6 +438,43 @@ impl Setting<'_> {
     }
 
     pub(super) fn shown(&self, effects: &EffectSet) -> Result<ReferenceSensor, ProblemError> {
-        ReferenceSensor::new(&self.params, effects, self.rig.bench.about.dt_s)
+        ReferenceSensor::new(&self.tuned.params, effects, self.rig.bench.about.dt_s)
+    }
+}
+
+/// The reference sensor behind a stage, skipped if no effect acts in the reference.
+pub(super) struct ReferenceSensor {
+    stage: Reference,
+    memory: Memory,
+    acts: bool,
+    work: Vec<f64>,
+}
+
+impl ReferenceSensor {
+    fn new(params: &RigParams, effects: &EffectSet, dt_s: f64) -> Result<Self, ProblemError> {
+        let stage = Reference::new(params, effects, &Grid::samples(dt_s)?)?;
+        let acts = effects.acting_in(RigStage::Reference).next().is_some();
+        let memory = stage.memory();
+        Ok(Self { stage, memory, acts, work: Vec::new() })
+    }
+
+    pub(super) fn condition(&mut self, length: &[f64]) -> Result<(), ProblemError> {
+        let mut out = vec![0.0; length.len()];
+        Ok(self.stage.run(&mut self.memory, Start::Settled, length, &mut out)?)
+    }
+
+    pub(super) fn run(&mut self, start: Start, length: &mut [f64]) -> Result<(), ProblemError> {
+        if self.acts {
+            self.work.clear();
+            self.work.extend_from_slice(length);
+            self.stage.run(&mut self.memory, start, &self.work, length)?;
+        }
+        Ok(())
+    }
+
+    fn undo(&self, length: &mut [f64]) {
+        if self.acts {
+            self.stage.undo(length);
+        }
     }
 }

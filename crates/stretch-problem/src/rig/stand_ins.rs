@@ -20,7 +20,8 @@ impl Setting<'_> {
         count: usize,
     ) -> Result<Arc<ByTrial>, ProblemError> {
         let begun = self.begun(count);
-        let key = causes(&[RigStage::Pneumatics], &self.params, &self.effects, &self.grid, begun);
+        let key =
+            causes(&[RigStage::Pneumatics], &self.tuned.params, &self.effects, &self.grid, begun);
         self.rig.found.or_make((Kept::Nodes, key), || {
             let mut memory = stage.memory();
             let before = self.before_kpa();
@@ -65,13 +66,13 @@ impl Setting<'_> {
         let grid = if has_pressure {
             Grid::samples(self.rig.bench.about.dt_s)?
         } else {
-            effects.grid(&self.params, self.rig.bench.about.dt_s, self.step_s)?
+            effects.grid(&self.tuned.params, self.rig.bench.about.dt_s, self.step_s)?
         };
-        let initial_share = self.initial_muscle;
+        let initial_share = self.tuned.initial_muscle;
         let without = Setting { effects, grid, initial_share, ..*self };
         let stages = [RigStage::Pneumatics, RigStage::Muscle, RigStage::Reference];
         let others = self.begun(count).chain([initial_share]);
-        let key = causes(&stages, &without.params, &without.effects, &without.grid, others);
+        let key = causes(&stages, &without.tuned.params, &without.effects, &without.grid, others);
         self.kept((Kept::Lengths, key), count, |all| match has_pressure {
             true => without.muscle(count, all),
             false => without.actuation(count, all),
@@ -81,9 +82,9 @@ impl Setting<'_> {
     /// Pressure of the nominal pneumatics, kPa, for recordings without a pressure column.
     pub(super) fn simulated_pressure(&self, count: usize) -> Result<Arc<ByTrial>, ProblemError> {
         let effects = self.rig.bench.effects.clone();
-        let grid = effects.grid(&self.params, self.rig.bench.about.dt_s, self.step_s)?;
+        let grid = effects.grid(&self.tuned.params, self.rig.bench.about.dt_s, self.step_s)?;
         let others = self.begun(count);
-        let key = causes(&[RigStage::Pneumatics], &self.params, &effects, &grid, others);
+        let key = causes(&[RigStage::Pneumatics], &self.tuned.params, &effects, &grid, others);
         let nominal = Setting { effects, grid, ..*self };
         self.kept((Kept::Samples, key), count, |all| nominal.pneumatics(count, all))
     }
@@ -111,6 +112,6 @@ impl Setting<'_> {
     /// The numbers that a run depends on in addition to parameters and effects: leads of the
     /// commands, and pressures at the start of the first trials.
     fn begun(&self, count: usize) -> impl Iterator<Item = f64> {
-        self.leads.into_iter().chain((0..count).map(|trial| self.initial_kpa(trial)))
+        self.tuned.leads.into_iter().chain((0..count).map(|trial| self.initial_kpa(trial)))
     }
 }

@@ -1,4 +1,6 @@
-//! A kind of effect on a channel of a stage.
+//! Wrappers: effects in front of or behind a stage of a black box.
+//!
+//! A [kind of effect](stretch_effects::Kind) at a place (an input or the output of a stage) is a wrapper.
 
 use std::{collections::BTreeSet, ops::Range, sync::Arc};
 
@@ -12,7 +14,7 @@ use stretch_gap::EffectSpec;
 
 use crate::{
     bench::columns::Columns,
-    black_box::{StageEntry, checked::StageRecord},
+    black_box::{SessionPart, StageEntry, checked::StageRecord},
     error::ProblemError,
 };
 
@@ -461,8 +463,9 @@ impl Placed {
         let mut ended_s: Option<f64> = None;
         let end = channel.len();
         let before = before.iter_mut().map(Some).chain(std::iter::repeat_with(|| None));
-        let parts = trials.parts.iter().take_while(|(r, _)| r.end <= end);
-        for ((range, start_s), before) in parts.zip(before) {
+        let begun_s = trials.parts.first().map_or(0.0, |first| first.start_s);
+        let parts = trials.parts.iter().take_while(|part| part.samples.end <= end);
+        for (SessionPart { samples: range, start_s, .. }, before) in parts.zip(before) {
             let before = before.and_then(Option::as_mut);
             let lead = usize::from(before.is_some());
             // before the trial, the second signal is assumed to have its first value
@@ -472,7 +475,7 @@ impl Placed {
                 *first = **before;
             }
             let signal = &mut signal[..];
-            let start_s = start_s - lead as f64 * trials.grid.dt_s();
+            let start_s = start_s - begun_s - lead as f64 * trials.grid.dt_s();
             let Some(&first) = signal.first() else { continue };
             let beside = match (&self.beside, self.kind.beside) {
                 (Some(beside), _) => led(&beside[range.clone()]),
@@ -509,8 +512,7 @@ impl Placed {
 /// The trials that operators act on.
 pub(crate) struct Trials<'a> {
     pub(crate) grid: &'a Grid,
-    /// Samples and session time of each, s, from the session's start.
-    pub(crate) parts: &'a [(Range<usize>, f64)],
+    pub(crate) parts: &'a [SessionPart],
 }
 
 /// Completes starts: a missing form gets its usual value, and each value is limited to its range.

@@ -40,12 +40,16 @@ impl Fmu {
     /// ```
     pub fn open(file: impl AsRef<Path>) -> Result<Self, FmuError> {
         let file = file.as_ref().to_owned();
-        let read = |why: String| FmuError::Read { file: file.clone(), why };
-        let folder = TempDir::new().map_err(|e| read(e.to_string()))?;
+        let folder = TempDir::new().map_err(|e| FmuError::of(&file, e))?;
         extract_zip_archive(&file, folder.path()).map_err(|e| match e {
-            ZipError::Io(e) => read(e.to_string()),
-            ZipError::Zip(e) => FmuError::Archive { file: file.clone(), why: e.to_string() },
-            e => read(e.to_string()),
+            ZipError::Io(e) => FmuError::of(&file, e),
+            ZipError::Zip(e) => FmuError::of(
+                &file,
+                format_args!(
+                    "it is not a ZIP archive, so it is not an FMU ({e}); give the .fmu file itself"
+                ),
+            ),
+            e => FmuError::of(&file, e),
         })?;
         let model = described(&file, folder.path())?;
         let fmu = Self { file, folder, model };
@@ -90,27 +94,33 @@ impl Fmu {
         found.sort();
         let wanted = self.library();
         let wanted = wanted.strip_prefix(self.folder()).unwrap_or(&wanted);
-        FmuError::Platform {
-            file: self.file.clone(),
-            wanted: wanted.display().to_string(),
-            found: match found.is_empty() {
-                true => "no binaries at all".into(),
-                false => found.join(", "),
-            },
-        }
+        let found = match found.is_empty() {
+            true => "no binaries at all".into(),
+            false => found.join(", "),
+        };
+        let wanted = wanted.display();
+        FmuError::of(
+            &self.file,
+            format_args!(
+                "it contains no {wanted} and cannot run on this machine; it contains {found}; export it for this platform"
+            ),
+        )
     }
 }
 
 fn described(file: &Path, folder: &Path) -> Result<Model, FmuError> {
     let path = folder.join("modelDescription.xml");
-    let fail = |why: String| FmuError::Description { file: file.to_owned(), why };
+    let fail = |why: String| {
+        FmuError::of(file, format_args!("its modelDescription.xml cannot be used: {why}"))
+    };
     if !path.is_file() {
         return Err(fail("there is no such file in the FMU".into()));
     }
     let refused = |e: ModelDescriptionError| match e {
         ModelDescriptionError::UnsupportedVersion(version)
         | ModelDescriptionError::UnknownVersion(version) => {
-            FmuError::Version { file: file.to_owned(), version }
+            let which = "only FMI 2.0 and FMI 3.0 are supported: export it as one of them";
+            FmuError::of(file, format_args!("it uses FMI {version}; {which}"))
         }
         ModelDescriptionError::Io(e) => fail(e.to_string()),
         e => fail(e.to_string()),
@@ -119,7 +129,9 @@ fn described(file: &Path, folder: &Path) -> Result<Model, FmuError> {
         FMIMajorVersion::V2 => Model::of_fmi2(&Description2::from_path(&path).map_err(refused)?),
         FMIMajorVersion::V3 => Model::of_fmi3(&Description3::from_path(&path).map_err(refused)?),
     };
-    let model = model.ok_or_else(|| FmuError::Exchange { file: file.to_owned() })?;
+    let exchange =
+        "it is for model exchange only and contains no solver; export it for co-simulation";
+    let model = model.ok_or_else(|| FmuError::of(file, exchange))?;
     // The identifier becomes a part of a path.
     let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
     match model.identifier.chars().all(is_word) && !model.identifier.is_empty() {

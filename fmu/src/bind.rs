@@ -124,7 +124,9 @@ fn check_mapped(session: &RecordedSession, names: &Names) -> Result<(), FmuError
         Some(name) => {
             let near = nearest(name, known.iter().copied());
             let near = near.map_or(String::new(), |near| format!(" (did you mean {near}?)"));
-            Err(FmuError::Mapped { name: name.clone(), near })
+            Err(FmuError(format!(
+                "variables: the problem has no parameter, effect or column {name}{near}"
+            )))
         }
     }
 }
@@ -149,13 +151,7 @@ impl Asked<'_> {
             None => named(self.name).or_else(|| bare().filter(|_| !self.unit.is_empty())),
         };
         let variable = found.ok_or_else(|| self.unknown(model, mapped.unwrap_or(self.name)))?;
-        let fail = |found: &str, hint| FmuError::Variable {
-            what: self.what,
-            name: self.name.into(),
-            variable: variable.name.clone(),
-            found: found.into(),
-            hint,
-        };
+        let fail = |found: &str, hint| self.unfit(variable, found, hint);
         if !self.roles.contains(&variable.role) {
             let hint = match self.what {
                 "input" => "a column drives an input",
@@ -171,27 +167,26 @@ impl Asked<'_> {
             ));
         }
         match variable.unit.as_deref().filter(|unit| !is_same(unit, self.unit)) {
-            Some(unit) => Err(FmuError::Unit {
-                what: self.what,
-                name: self.name.into(),
-                problem: self.unit.into(),
-                variable: variable.name.clone(),
-                found: unit.into(),
-            }),
+            Some(unit) => Err(FmuError(format!(
+                "{} {} is in {}, but variable {} of the FMU is in {unit}; convert the recording or the value, or correct its \
+                 unit in the problem",
+                self.what, self.name, self.unit, variable.name
+            ))),
             None => Ok(variable),
         }
+    }
+
+    /// Returns the error of a variable with an unsuitable role or type.
+    fn unfit(&self, variable: &Variable, found: &str, hint: &str) -> FmuError {
+        let (Self { what, name, .. }, variable) = (self, &variable.name);
+        FmuError(format!("{what} {name}: variable {variable} of the FMU is {found}; {hint}"))
     }
 
     /// Refuses a variable that is already set under another name.
     fn once<'m>(&self, variable: &'m Variable, set: &mut Vec<&'m str>) -> Result<(), FmuError> {
         if set.contains(&variable.name.as_str()) {
-            return Err(FmuError::Variable {
-                what: self.what,
-                name: self.name.into(),
-                variable: variable.name.clone(),
-                found: "already set by another name of the problem".into(),
-                hint: "remove one of the two names",
-            });
+            let found = "already set by another name of the problem";
+            return Err(self.unfit(variable, found, "remove one of the two names"));
         }
         set.push(&variable.name);
         Ok(())
@@ -217,19 +212,16 @@ impl Asked<'_> {
             0 => String::new(),
             n => format!(" and {n} more"),
         };
-        FmuError::Unknown {
-            what: self.what,
-            name: self.name.into(),
-            variable: variable.into(),
-            near: match near.is_empty() {
-                true => String::new(),
-                false => format!(" (did you mean {}?)", near.join(" or ")),
-            },
-            known: match listed.is_empty() {
-                true => "no suitable variable".into(),
-                false => listed.join(", ") + &more,
-            },
-        }
+        let near = match near.is_empty() {
+            true => String::new(),
+            false => format!(" (did you mean {}?)", near.join(" or ")),
+        };
+        let known = match listed.is_empty() {
+            true => "no suitable variable".into(),
+            false => listed.join(", ") + &more,
+        };
+        let Self { what, name, .. } = self;
+        FmuError(format!("{what} {name}: the FMU has no variable {variable}{near}; it has {known}"))
     }
 }
 

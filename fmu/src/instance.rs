@@ -1,6 +1,7 @@
 //! An instance of an FMU, from instantiation to termination, for both versions of the standard.
 
 use std::{
+    cell::RefCell,
     mem,
     sync::{Arc, Mutex, PoisonError},
 };
@@ -27,38 +28,8 @@ pub(crate) enum Stopped {
     Fatal(String),
 }
 
-/// The status of a call, common to both versions.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Status {
-    Fine,
-    Discard,
-    Error,
-    Fatal,
-    Pending,
-}
-
-impl From<fmi2Status> for Status {
-    fn from(status: fmi2Status) -> Self {
-        match status {
-            fmi2Status::Ok | fmi2Status::Warning => Self::Fine,
-            fmi2Status::Discard => Self::Discard,
-            fmi2Status::Error => Self::Error,
-            fmi2Status::Fatal => Self::Fatal,
-            fmi2Status::Pending => Self::Pending,
-        }
-    }
-}
-
-impl From<fmi3Status> for Status {
-    fn from(status: fmi3Status) -> Self {
-        match status {
-            fmi3Status::Ok | fmi3Status::Warning => Self::Fine,
-            fmi3Status::Discard => Self::Discard,
-            fmi3Status::Error => Self::Error,
-            fmi3Status::Fatal => Self::Fatal,
-        }
-    }
-}
+/// Names of the statuses of a call by their numbers, which both versions of the standard share.
+const STATUSES: [&str; 6] = ["ok", "warning", "discard", "error", "fatal", "pending"];
 
 /// The last warning or error message of an FMU.
 #[derive(Debug, Default)]
@@ -133,8 +104,8 @@ impl Group {
         self.at.iter().map(|&at| values[at]).collect()
     }
 
-    fn put(&self, from: &[f64], values: &mut [f64]) {
-        self.at.iter().zip(from).for_each(|(&at, x)| values[at] = *x);
+    fn put<T: Into<f64>>(&self, from: Vec<T>, values: &mut [f64]) {
+        self.at.iter().zip(from).for_each(|(&at, x)| values[at] = x.into());
     }
 }
 
@@ -194,160 +165,134 @@ impl Instance {
         }
     }
 
-    /// Converts the status of a call to a result.
-    fn checked(&mut self, call: &str, status: Status) -> Result<(), Stopped> {
-        let said = self.said.text();
-        match status {
-            Status::Fine => Ok(()),
-            Status::Discard => {
-                Err(Stopped::Refused(format!("{call} returned the status discard{said}")))
-            }
-            Status::Error => {
-                Err(Stopped::Refused(format!("{call} returned the status error{said}")))
-            }
-            Status::Pending => Err(Stopped::Refused(format!(
-                "{call} returned the status pending: steps in the background are not supported{said}"
-            ))),
-            Status::Fatal => {
+    /// Calls the library by one of two functions, depending on the version.
+    fn call(
+        &mut self,
+        name: &str,
+        two: impl FnOnce(&FMU2<CS>) -> fmi2Status,
+        three: impl FnOnce(&FMU3) -> fmi3Status,
+    ) -> Result<(), Stopped> {
+        let status = match &self.native {
+            Some(Native::Two(fmu)) => two(fmu) as usize,
+            Some(Native::Three(fmu)) => three(fmu) as usize,
+            None => 0,
+        };
+        let stopped = || format!("{name} returned the status {}", STATUSES[status]);
+        match STATUSES[status] {
+            "ok" | "warning" => Ok(()),
+            "fatal" => {
                 // After a fatal status the instance may not even be freed, so its memory is leaked.
                 if let Some(native) = self.native.take() {
                     mem::forget(native);
                 }
-                Err(Stopped::Fatal(format!("{call} returned the status fatal{said}")))
+                Err(Stopped::Fatal(stopped() + &self.said.text()))
             }
+            "pending" => Err(Stopped::Refused(
+                stopped() + ": steps in the background are not supported" + &self.said.text(),
+            )),
+            _ => Err(Stopped::Refused(stopped() + &self.said.text())),
         }
     }
 
     pub(crate) fn set(&mut self, slots: &Slots, values: &[f64]) -> Result<(), Stopped> {
-        let (doubles, singles) = (&slots.doubles, &slots.singles);
-        let status = match &self.native {
-            Some(Native::Two(fmu)) if !doubles.is_empty() => {
-                fmu.setReal(&doubles.references, &doubles.picked(values)).into()
-            }
-            Some(Native::Three(fmu)) if !doubles.is_empty() => {
-                fmu.setFloat64(&doubles.references, &doubles.picked(values)).into()
-            }
-            _ => Status::Fine,
-        };
-        self.checked("setting values", status)?;
-        let status = match &self.native {
-            Some(Native::Three(fmu)) if !singles.is_empty() => {
-                let values: Vec<f32> =
-                    singles.picked(values).into_iter().map(|x| x as f32).collect();
-                fmu.setFloat32(&singles.references, &values).into()
-            }
-            _ => Status::Fine,
-        };
-        self.checked("setting values", status)
+        let Slots { doubles, singles, .. } = slots;
+        let what = "setting values";
+        if !doubles.is_empty() {
+            let (at, own) = (&doubles.references, doubles.picked(values));
+            self.call(what, |fmu| fmu.setReal(at, &own), |fmu| fmu.setFloat64(at, &own))?;
+        }
+        if !singles.is_empty() {
+            let own: Vec<f32> = singles.picked(values).into_iter().map(|x| x as f32).collect();
+            let at = &singles.references;
+            self.call(what, |_| fmi2Status::Ok, |fmu| fmu.setFloat32(at, &own))?;
+        }
+        Ok(())
     }
 
     pub(crate) fn read(&mut self, slots: &Slots, values: &mut [f64]) -> Result<(), Stopped> {
-        let (doubles, singles) = (&slots.doubles, &slots.singles);
-        let mut own = vec![0.0; doubles.at.len()];
-        let status = match &self.native {
-            Some(Native::Two(fmu)) if !doubles.is_empty() => {
-                fmu.getReal(&doubles.references, &mut own).into()
-            }
-            Some(Native::Three(fmu)) if !doubles.is_empty() => {
-                fmu.getFloat64(&doubles.references, &mut own).into()
-            }
-            _ => Status::Fine,
-        };
-        self.checked("reading values", status)?;
-        doubles.put(&own, values);
-        let mut own = vec![0.0_f32; singles.at.len()];
-        let status = match &self.native {
-            Some(Native::Three(fmu)) if !singles.is_empty() => {
-                fmu.getFloat32(&singles.references, &mut own).into()
-            }
-            _ => Status::Fine,
-        };
-        self.checked("reading values", status)?;
-        let own: Vec<f64> = own.into_iter().map(f64::from).collect();
-        singles.put(&own, values);
+        let Slots { doubles, singles, .. } = slots;
+        let what = "reading values";
+        if !doubles.is_empty() {
+            let (at, own) = (&doubles.references, RefCell::new(vec![0.0; doubles.at.len()]));
+            self.call(
+                what,
+                |fmu| fmu.getReal(at, &mut own.borrow_mut()),
+                |fmu| fmu.getFloat64(at, &mut own.borrow_mut()),
+            )?;
+            doubles.put(own.into_inner(), values);
+        }
+        if !singles.is_empty() {
+            let mut own = vec![0.0_f32; singles.at.len()];
+            let at = &singles.references;
+            self.call(what, |_| fmi2Status::Ok, |fmu| fmu.getFloat32(at, &mut own))?;
+            singles.put(own, values);
+        }
         Ok(())
     }
 
     /// Enters the initialization mode. Called after setting start values and before setting the
     /// first inputs.
     pub(crate) fn begin(&mut self) -> Result<(), Stopped> {
-        let status = match &self.native {
-            Some(Native::Two(fmu)) => match fmu.setupExperiment(None, 0.0, None) {
-                fmi2Status::Ok | fmi2Status::Warning => fmu.enterInitializationMode().into(),
-                status => status.into(),
+        self.call(
+            "beginning its initialization",
+            |fmu| match fmu.setupExperiment(None, 0.0, None) {
+                fmi2Status::Ok | fmi2Status::Warning => fmu.enterInitializationMode(),
+                status => status,
             },
-            Some(Native::Three(fmu)) => fmu.enterInitializationMode(None, 0.0, None).into(),
-            None => Status::Fine,
-        };
-        self.checked("beginning its initialization", status)
+            |fmu| fmu.enterInitializationMode(None, 0.0, None),
+        )
     }
 
     /// Exits the initialization mode. Called after setting the first inputs.
     pub(crate) fn begun(&mut self) -> Result<(), Stopped> {
-        let status = match &self.native {
-            Some(Native::Two(fmu)) => fmu.exitInitializationMode().into(),
-            Some(Native::Three(fmu)) => fmu.exitInitializationMode().into(),
-            None => Status::Fine,
-        };
-        self.checked("its initialization", status)
+        let what = "its initialization";
+        self.call(what, |fmu| fmu.exitInitializationMode(), |fmu| fmu.exitInitializationMode())
     }
 
     /// Advances by one step of the session.
     pub(crate) fn step(&mut self, time_s: f64, step_s: f64) -> Result<(), Stopped> {
         let (mut event, mut is_over, mut is_early, mut reached_s) = (false, false, false, time_s);
-        let status = match &self.native {
+        let at = format!("the step at {time_s:.6} s");
+        self.call(
+            &at,
             // The flag 1 promises that the simulation never returns to a time before this point.
-            Some(Native::Two(fmu)) => fmu.doStep(time_s, step_s, 1).into(),
-            Some(Native::Three(fmu)) => fmu
-                .doStep(
-                    time_s,
-                    step_s,
-                    true,
-                    &mut event,
-                    &mut is_over,
-                    &mut is_early,
-                    &mut reached_s,
-                )
-                .into(),
-            None => Status::Fine,
-        };
-        let at = || format!("the step at {time_s:.6} s");
-        self.checked(&at(), status)?;
+            |fmu| fmu.doStep(time_s, step_s, 1),
+            |fmu| {
+                let flags = (&mut event, &mut is_over, &mut is_early, &mut reached_s);
+                fmu.doStep(time_s, step_s, true, flags.0, flags.1, flags.2, flags.3)
+            },
+        )?;
         if is_over || is_early {
             let how = if is_over { "ends the simulation" } else { "returns early" };
             let said = self.said.text();
-            return Err(Stopped::Refused(format!("{} {how} at {reached_s:.6} s{said}", at())));
+            return Err(Stopped::Refused(format!("{at} {how} at {reached_s:.6} s{said}")));
         }
         Ok(())
     }
 
     /// Terminates a run regularly.
     pub(crate) fn end(&mut self) -> Result<(), Stopped> {
-        let status = match &self.native {
-            Some(Native::Two(fmu)) => fmu.terminate().into(),
-            Some(Native::Three(fmu)) => fmu.terminate().into(),
-            None => Status::Fine,
-        };
-        self.checked("terminating it", status)
+        self.call("terminating it", |fmu| fmu.terminate(), |fmu| fmu.terminate())
     }
 }
 
 fn not_made(fmu: &Fmu, error: SimulationError, said: &Said) -> FmuError {
-    let file = fmu.file().to_owned();
-    match error {
+    let why = match error {
         SimulationError::Library { source, .. } => {
-            FmuError::Library { file, why: source.to_string() }
+            format!("its library cannot be loaded: {source}")
         }
-        SimulationError::Symbol { name, .. } => {
-            FmuError::Function { file, name, version: fmu.model().version.number() }
-        }
+        SimulationError::Symbol { name, .. } => format!(
+            "its library has no function {name}, which every FMU of FMI {} has; export it again",
+            fmu.model().version.number()
+        ),
         SimulationError::FMICall => {
             let tool = match fmu.model().needs_tool {
                 true => "; it needs the program that it was exported from, installed and licensed",
                 false => "",
             };
-            FmuError::Instance { file, said: said.text() + tool }
+            format!("it cannot be instantiated{}{tool}", said.text())
         }
-        other => FmuError::Instance { file, said: format!(": {other}") },
-    }
+        other => format!("it cannot be instantiated: {other}"),
+    };
+    FmuError::of(fmu.file(), why)
 }

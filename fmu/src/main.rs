@@ -7,52 +7,33 @@ use std::{
     process::ExitCode,
 };
 
+use clap::Parser;
 use stretch_fmu::{Fmu, FmuSource, Names, ServeError, describe, serve};
 
-const USAGE: &str = "\
-An FMU (FMI 2 or 3, co-simulation) as a worker of stretch.
-
-stretch-fmu FILE.fmu [--variable NAME=VARIABLE]... [--unit NAME=UNIT]...
-    answers frames on standard input with frames on standard output (book/src/reference/worker.md);
-    stretch starts it for a problem whose simulator is an fmu
-    --variable  what a parameter, an effect or a column is called in the FMU
-    --unit      unit of a parameter or an effect in the problem
-
-stretch-fmu --describe FILE.fmu
-    prints the beginning of a problem.toml
-";
-
-/// The requested action.
-enum Asked {
-    Help,
-    Describe(PathBuf),
-    Serve(PathBuf, Names),
+/// An FMU (FMI 2 or 3, co-simulation) as a worker of stretch
+///
+/// It answers frames on standard input with frames on standard output (book/src/reference/worker.md). The program stretch
+/// starts it for a problem whose simulator is an fmu.
+#[derive(Parser)]
+#[command(version)]
+struct Args {
+    /// The FMU
+    #[arg(value_name = "FILE.fmu")]
+    file: PathBuf,
+    /// Print the beginning of a problem.toml
+    #[arg(long)]
+    describe: bool,
+    /// What a parameter, an effect or a column is called in the FMU
+    #[arg(long, value_name = "NAME=VARIABLE", value_parser = pair)]
+    variable: Vec<(String, String)>,
+    /// Unit of a parameter or an effect in the problem
+    #[arg(long, value_name = "NAME=UNIT", value_parser = pair)]
+    unit: Vec<(String, String)>,
 }
 
-fn parse(mut arguments: impl Iterator<Item = String>) -> Result<Asked, String> {
-    let (mut file, mut names, mut describes) = (None, Names::default(), false);
-    while let Some(argument) = arguments.next() {
-        let mut pair = |into: &mut std::collections::BTreeMap<String, String>| {
-            let pair = arguments.next().ok_or_else(|| format!("{argument} needs NAME=VALUE"))?;
-            let (name, value) =
-                pair.split_once('=').ok_or_else(|| format!("{pair:?} is not NAME=VALUE"))?;
-            into.insert(name.to_owned(), value.to_owned());
-            Ok::<(), String>(())
-        };
-        match argument.as_str() {
-            "--help" | "-h" => return Ok(Asked::Help),
-            "--describe" => describes = true,
-            "--variable" => pair(&mut names.variables)?,
-            "--unit" => pair(&mut names.units)?,
-            option if option.starts_with("--") => {
-                return Err(format!("there is no option {option}\n\n{USAGE}"));
-            }
-            _ if file.is_some() => return Err(format!("{argument}: one FMU is enough\n\n{USAGE}")),
-            _ => file = Some(PathBuf::from(argument)),
-        }
-    }
-    let file = file.ok_or_else(|| format!("give an FMU\n\n{USAGE}"))?;
-    Ok(if describes { Asked::Describe(file) } else { Asked::Serve(file, names) })
+fn pair(text: &str) -> Result<(String, String), String> {
+    let (name, value) = text.split_once('=').ok_or("it is not NAME=VALUE")?;
+    Ok((name.to_owned(), value.to_owned()))
 }
 
 /// Returns a stream for frames only. Anything that the FMU prints to standard output goes to
@@ -69,31 +50,28 @@ fn frames() -> io::Result<io::Stdout> {
     Ok(io::stdout())
 }
 
-fn run() -> Result<(), String> {
-    match parse(std::env::args().skip(1))? {
-        Asked::Help => print(USAGE),
-        Asked::Describe(file) => print(&describe(&Fmu::open(file).map_err(|e| e.to_string())?)),
-        Asked::Serve(file, names) => {
-            let to = frames().map_err(|e| format!("standard output: {e}"))?;
-            let begin = |session: &_| {
-                Fmu::open(&file).and_then(|fmu| FmuSource::new(fmu, Clone::clone(session), &names))
-            };
-            match serve(io::stdin().lock(), to, begin) {
-                Ok(()) => Ok(()),
-                // The other side has already received this error and reports it.
-                Err(ServeError::Simulator(_)) => std::process::exit(1),
-                Err(error) => Err(error.to_string()),
-            }
-        }
+fn run(args: Args) -> Result<(), String> {
+    let Args { file, describe: describes, variable, unit } = args;
+    if describes {
+        let text = describe(&Fmu::open(file).map_err(|e| e.to_string())?);
+        return io::stdout().write_all(text.as_bytes()).map_err(|e| e.to_string());
+    }
+    let names =
+        Names { variables: variable.into_iter().collect(), units: unit.into_iter().collect() };
+    let to = frames().map_err(|e| format!("standard output: {e}"))?;
+    let begin = |session: &_| {
+        Fmu::open(&file).and_then(|fmu| FmuSource::new(fmu, Clone::clone(session), &names))
+    };
+    match serve(io::stdin().lock(), to, begin) {
+        Ok(()) => Ok(()),
+        // The other side has already received this error and reports it.
+        Err(ServeError::Simulator(_)) => std::process::exit(1),
+        Err(error) => Err(error.to_string()),
     }
 }
 
-fn print(text: &str) -> Result<(), String> {
-    io::stdout().write_all(text.as_bytes()).map_err(|e| e.to_string())
-}
-
 fn main() -> ExitCode {
-    match run() {
+    match run(Args::parse()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(why) => {
             eprintln!("stretch-fmu: {why}");

@@ -3,7 +3,8 @@
 
 use std::io::{ErrorKind, Read, Write};
 
-use serde_json::{Map, Value, json};
+use serde::Deserialize;
+use serde_json::{Value, json};
 use stretch_problem::{
     AlteredColumn, Ask, RecordedSession, Source, SourceError,
     worker::{FrameError, PREFIX, Prefix, WorkerFrame, read_session},
@@ -119,12 +120,16 @@ fn receive(from: &mut impl Read) -> Result<Option<WorkerFrame>, ServeError> {
     Ok(Some(WorkerFrame::parse(&header, &body)?))
 }
 
-fn each<T>(
-    of: &Map<String, Value>,
-    key: &str,
-    read: impl FnMut(&Value) -> Option<T>,
-) -> Option<Vec<T>> {
-    of.get(key)?.as_array()?.iter().map(read).collect()
+/// A model of a `simulate` frame, without its values.
+#[derive(Deserialize)]
+struct Model {
+    stage: usize,
+    trials: usize,
+    /// Whether the inputs of its stage are altered.
+    inputs: bool,
+    /// Stage and input of each altered column of other stages.
+    #[serde(default)]
+    others: Vec<(usize, usize)>,
 }
 
 /// A request to simulate, with its altered inputs if there are any.
@@ -144,9 +149,8 @@ fn read_asks<'a>(frame: &'a WorkerFrame, session: &RecordedSession) -> Option<Ve
         rest = behind;
         Some(own)
     };
-    each(&frame.header, "models", |model| {
-        let index = |key: &str| usize::try_from(model.get(key)?.as_u64()?).ok();
-        let (stage, trials) = (index("stage")?, index("trials")?);
+    let models = Vec::<Model>::deserialize(frame.header.get("models")?).ok()?;
+    let one = |Model { stage, trials, inputs, others }: Model| {
         if trials > session.trials.len() {
             return None;
         }
@@ -154,22 +158,20 @@ fn read_asks<'a>(frame: &'a WorkerFrame, session: &RecordedSession) -> Option<Ve
         let parameters = take(session.parameters.len())?;
         let effects = take(session.effects.len())?;
         let count = session.stages.get(stage)?.inputs.len();
-        let inputs = match model.get("inputs")?.as_bool()? {
+        let inputs = match inputs {
             true => Some(
                 (0..count).map(|_| take(samples).map(<[f64]>::to_vec)).collect::<Option<_>>()?,
             ),
             false => None,
         };
-        let other = |place: &Value| {
-            let at = |i: usize| usize::try_from(place.get(i)?.as_u64()?).ok();
-            let (stage, input) = (at(0)?, at(1)?);
+        let other = |(stage, input): (usize, usize)| {
             session.stages.get(stage)?.inputs.get(input)?;
             Some(AlteredColumn { stage, input, values: take(samples)? })
         };
-        let others = model.get("others").and_then(Value::as_array).into_iter().flatten();
-        let others = others.map(other).collect::<Option<_>>()?;
+        let others = others.into_iter().map(other).collect::<Option<_>>()?;
         Some(Owned { stage, parameters, effects, inputs, others, trials })
-    })
+    };
+    models.into_iter().map(one).collect()
 }
 
 fn simulate(

@@ -44,10 +44,7 @@ impl FmuSource {
     /// libraries that cannot be loaded.
     pub fn new(fmu: Fmu, session: RecordedSession, names: &Names) -> Result<Self, FmuError> {
         let bound = Bound::new(fmu.model(), &session, names)?;
-        let gone = || FmuError::Instance {
-            file: fmu.file().to_owned(),
-            said: ": its thread failed".into(),
-        };
+        let gone = || FmuError::of(fmu.file(), "it cannot be instantiated: its thread failed");
         apart(|| Instance::new(&fmu).map(drop)).unwrap_or_else(|| Err(gone()))?;
         Ok(Self { fmu, session, bound, turn: Mutex::new(()) })
     }

@@ -4,7 +4,7 @@ mod support;
 
 use std::fs;
 
-use stretch_fmu::{Fmu, FmuError};
+use stretch_fmu::Fmu;
 use stretch_problem::{
     Ask, Checked, Parameter, ProblemSpec, Source, SourceError,
     worker::{Workers, WorkersSpec},
@@ -47,8 +47,9 @@ fn a_file_that_is_no_fmu_is_refused() {
     fs::write(&file, "model\n  Real x;\nend model;\n").unwrap();
     let error = started(spec(), worker(&file, &[])).unwrap_err();
     assert!(error.contains("it is not a ZIP archive, so it is not an FMU"), "{error}");
-    let error = Fmu::open(folder.path().join("none.fmu")).unwrap_err();
-    assert!(matches!(error, FmuError::Read { .. }), "{error}");
+    let none = folder.path().join("none.fmu");
+    let error = Fmu::open(&none).unwrap_err().to_string();
+    assert!(error.starts_with(&none.display().to_string()), "{error}");
 }
 
 #[test]

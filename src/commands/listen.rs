@@ -12,20 +12,14 @@ use std::{
 };
 
 use anyhow::Context;
-use stretch_calibrate::{BoardReceptor, converter_reach, parse_adc, read_calibration};
-use stretch_core::{Branch, Calibration, Interval, RateEstimator, Runner, Target, Volts};
+use stretch_calibrate::{
+    BoardReceptor, Link, LinkSample, Twin, converter_reach, parse_adc, read_calibration,
+};
+use stretch_core::Interval;
 use stretch_data::files::is_standard_output;
-use stretch_link::{Answer, Decoder, Event, TimeLine};
-use stretch_receptor::{
-    Receptor,
-    code::{Adc, AdcCode},
-};
+use stretch_receptor::code::Adc;
 
-use self::{
-    port::Heard,
-    trial_file::{Sample, TrialFile},
-    view::{Status, View},
-};
+use self::{port::Heard, trial_file::TrialFile, view::View};
 use super::shared::{begin_recording, is_ended};
 use crate::display::warn;
 
@@ -72,10 +66,10 @@ pub(crate) struct Args {
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
-    let twin = Twin::read(&args.calibration, &args.adc)?;
+    let twin = read_twin(&args.calibration, &args.adc)?;
     let (shown_port, baud) = path_and_speed(&args.port);
     let heard = port::listen(Path::new(shown_port), baud).with_context(|| shown_port.to_owned())?;
-    let header = trial_file::header(&twin);
+    let header = twin.header();
     // Created after everything else that can fail, so that a failed start leaves no file.
     let out = args.out.as_deref();
     let file = out.filter(|out| !is_standard_output(out));
@@ -87,12 +81,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if !twin.answers() {
         view.note("the rate estimator of the calibration needs the next sample, so estimates are not compared");
     }
-    let mut session = Samples::new(twin, args.adc);
+    let (mut session, begun) = (Link::new(twin, args.adc), Instant::now());
     let mut result = Ok(());
     while !is_ended() {
         let is_last = match heard.recv_timeout(Duration::from_millis(50)) {
             Ok(Heard::Bytes(bytes)) => {
-                let samples = session.take(&bytes);
+                let samples = session.take(&bytes, begun.elapsed().as_secs_f64());
                 result = keep(&samples, &mut recording, &mut view);
                 false
             }
@@ -102,13 +96,13 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
                 false
             }
             Ok(Heard::Disconnected(why)) => {
-                let last = session.disconnected();
+                let last = session.disconnected(begun.elapsed().as_secs_f64());
                 result = keep(last.as_slice(), &mut recording, &mut view);
                 view.note(&format!("{shown_port}: {why}; waiting for the port"));
                 false
             }
             Ok(Heard::Ended) | Err(RecvTimeoutError::Disconnected) => {
-                let last = session.disconnected();
+                let last = session.disconnected(begun.elapsed().as_secs_f64());
                 result = keep(last.as_slice(), &mut recording, &mut view);
                 true
             }
@@ -144,7 +138,7 @@ fn path_and_speed(port: &str) -> (&str, u32) {
 
 /// Records the samples before they are shown.
 fn keep(
-    samples: &[Sample],
+    samples: &[LinkSample],
     recording: &mut Option<TrialFile>,
     view: &mut View,
 ) -> std::io::Result<()> {
@@ -159,183 +153,25 @@ fn cannot_record(path: Option<&Path>) -> String {
     format!("{}: cannot record there", path.unwrap_or(Path::new("")).display())
 }
 
-/// Period of the board's clock, s.
-const TICK_S: f64 = 1e-3;
-
-/// Converts received bytes to samples.
-struct Samples {
-    decoder: Decoder,
-    time_line: TimeLine,
-    begun: Instant,
-    adc: Adc,
-    /// The calibration on this computer, which receives the same codes as the board.
-    twin: Twin,
-    status: Status,
-}
-
-impl Samples {
-    fn new(twin: Twin, adc: Adc) -> Self {
-        let status = Status {
-            compared: twin.answers().then_some((0, 0.0)),
-            adc_bits: adc.spec().bits,
-            unit: twin.unit.clone(),
-            ..Status::default()
-        };
-        // The default is for a calibration file that does not contain a sample period.
-        let time_line = TimeLine::new(twin.period_s.unwrap_or(TICK_S));
-        Self { decoder: Decoder::new(), time_line, begun: Instant::now(), adc, twin, status }
-    }
-
-    fn take(&mut self, bytes: &[u8]) -> Vec<Sample> {
-        let mut samples = Vec::new();
-        for &byte in bytes {
-            let event = self.decoder.push(byte);
-            samples.extend(event.and_then(|event| self.sample(event)));
+/// Reads a file of `stretch calibrate` or of `stretch export --fixed`.
+fn read_twin(path: &Path, adc: &Adc) -> anyhow::Result<Twin> {
+    let Some(receptor) = BoardReceptor::read(path) else {
+        let calibration = read_calibration(path)?;
+        let (spec, range) = (calibration.spec(), calibration.spec().signal_range);
+        let range = Interval { min: range.min(), max: range.max() };
+        let note = converter_reach(&spec.signal, range, adc);
+        if let Some(note) = note.with_context(|| path.display().to_string())? {
+            warn(format!("note: {note}"));
         }
-        self.status.counts = self.decoder.counts();
-        samples
-    }
-
-    fn sample(&mut self, event: Event) -> Option<Sample> {
-        let frame = event.frame()?;
-        if !matches!(event, Event::Frame(_)) {
-            // The board has seen samples that did not arrive here, or has restarted. The estimates
-            // of board and computer agree again once the window of the rate filter is filled.
-            self.twin.reset();
-        }
-        let time_s = self.time_line.time_s(&event, self.begun.elapsed().as_secs_f64());
-        let sample = Sample::new(time_s.unwrap_or(f64::NAN), frame, &self.adc, self.twin.target);
-        match frame.code {
-            code if code < 0 => self.status.missing += 1,
-            code if sample.signal.is_none() => {
-                self.status.beyond += 1;
-                self.status.largest = self.status.largest.max(code);
-            }
-            _ => {}
-        }
-        self.compare(&sample);
-        self.status.newest = sample.estimate.or(self.status.newest);
-        // A sample with an unknown time cannot be a row of a trial.
-        self.status.standing += u64::from(time_s.is_none());
-        time_s.map(|_| sample)
-    }
-
-    /// Compares the estimates of board and computer, if both have one on the same branch.
-    fn compare(&mut self, sample: &Sample) {
-        let ours = self.twin.step(AdcCode(sample.frame.code), sample.signal);
-        let (Some((ours, own)), Answer::Reading { branch, .. }) = (ours, sample.frame.answer)
-        else {
-            return;
-        };
-        if let (Some(theirs), true) = (sample.estimate, branch == own) {
-            let difference = (theirs - ours).abs();
-            let compared = self.status.compared.map(|(n, most)| (n + 1, most.max(difference)));
-            self.status.compared = compared;
-        }
-    }
-
-    /// Ends the frame in progress, because no further byte follows. The last frame may lack its
-    /// newline.
-    fn disconnected(&mut self) -> Option<Sample> {
-        let last = self.decoder.disconnected();
-        let last = last.and_then(|event| self.sample(event));
-        self.status.counts = self.decoder.counts();
-        self.status.connected = false;
-        last
-    }
-}
-
-/// The parts of a calibration file that concern the stream, and the receptor of the calibration.
-pub(super) struct Twin {
-    /// Column of the signal.
-    pub signal: String,
-    /// Unit of the estimate; empty if the file does not contain it.
-    pub unit: String,
-    /// Sample period, s, if the file contains it.
-    pub period_s: Option<f64>,
-    /// The target, if the file contains it.
-    target: Option<Target>,
-    receptor: Own,
-}
-
-enum Own {
-    Volts(Box<Runner<Receptor<f64>>>),
-    Codes(BoardReceptor),
-    /// The rate estimator needs the next sample, so there are no live estimates.
-    Silent,
-}
-
-impl Twin {
-    /// Reads a file of `stretch calibrate` or of `stretch export --fixed`.
-    pub(super) fn read(path: &Path, adc: &Adc) -> anyhow::Result<Self> {
-        let Some(receptor) = BoardReceptor::read(path) else {
-            let calibration = read_calibration(path)?;
-            let (spec, range) = (calibration.spec(), calibration.spec().signal_range);
-            let range = Interval { min: range.min(), max: range.max() };
-            let note = converter_reach(&spec.signal, range, adc);
-            if let Some(note) = note.with_context(|| path.display().to_string())? {
-                warn(format!("note: {note}"));
-            }
-            return Self::of(&calibration);
-        };
-        let bits = receptor.adc_bits();
-        anyhow::ensure!(
-            bits == adc.spec().bits,
-            "{}: this calibration file is for a converter of {bits} bits; give --adc {bits},ZERO,FULL_SCALE",
-            path.display()
-        );
-        Ok(Self {
-            signal: "signal".to_owned(),
-            unit: String::new(),
-            period_s: None,
-            target: None,
-            receptor: Own::Codes(receptor),
-        })
-    }
-
-    fn of(calibration: &Calibration) -> anyhow::Result<Self> {
-        let receptor = match (Receptor::new(calibration), calibration.spec().rate_estimator) {
-            (Ok(receptor), _) => Own::Volts(Box::new(Runner::new(receptor))),
-            (Err(_), RateEstimator::CentralDifference) => Own::Silent,
-            (Err(error), _) => return Err(error.into()),
-        };
-        Ok(Self {
-            signal: calibration.spec().signal.as_str().to_owned(),
-            unit: calibration.spec().reference.unit().to_owned(),
-            period_s: Some(calibration.spec().sample_rate_hz.period_s()),
-            target: Some(calibration.spec().target),
-            receptor,
-        })
-    }
-
-    /// Whether there are live estimates.
-    pub(super) fn answers(&self) -> bool {
-        !matches!(self.receptor, Own::Silent)
-    }
-
-    /// Resets the receptor.
-    pub(super) fn reset(&mut self) {
-        match &mut self.receptor {
-            Own::Volts(receptor) => receptor.reset(),
-            Own::Codes(receptor) => receptor.reset(),
-            Own::Silent => {}
-        }
-    }
-
-    /// Returns the estimate for a sample, in the unit of the reference, and its branch.
-    pub(super) fn step(&mut self, code: AdcCode, signal: Option<f64>) -> Option<(f64, Branch)> {
-        match &mut self.receptor {
-            Own::Volts(receptor) => {
-                let reading = receptor.step(Volts(signal.unwrap_or(f64::NAN))).ok()?;
-                Some((reading.estimate, reading.branch))
-            }
-            Own::Codes(receptor) => {
-                let reading = receptor.step(code).ok()?;
-                Some((f64::from(reading.estimate) / 1000.0, reading.branch))
-            }
-            Own::Silent => None,
-        }
-    }
+        return Ok(Twin::new(&calibration)?);
+    };
+    let bits = receptor.adc_bits();
+    anyhow::ensure!(
+        bits == adc.spec().bits,
+        "{}: this calibration file is for a converter of {bits} bits; give --adc {bits},ZERO,FULL_SCALE",
+        path.display()
+    );
+    Ok(Twin::of_board(receptor))
 }
 
 #[cfg(test)]

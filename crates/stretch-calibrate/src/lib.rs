@@ -12,12 +12,13 @@ mod record;
 pub use error::CalibrateError;
 pub use fit::{Calibrated, Coefficient, FitReport, Order, calibrate};
 pub use judge::{
-    Applied, Candidate, Comparison, Doubt, Evaluation, Faults, Judged, LiveReceptor, MethodErrors,
-    ModelChoice, ModelRow, Reach, Seen, TrialErrors, apply, at_rate, candidate_models,
-    choose_among, choose_model, choose_model_watched, copied_signals, estimates_header, evaluate,
-    evaluate_errors, evaluation_doubts, explains_little, explains_nothing, fitted_trials,
-    judge_model, m3_instructions, m3_instructions_fixed, on_own_ranges, outside_range,
-    pressure_column, push_estimate, rank_signals,
+    Applied, Candidate, Comparison, Doubt, Evaluation, Faults, Judged, Link, LinkSample,
+    LinkStatus, LiveReceptor, MethodErrors, ModelChoice, ModelRow, Reach, Seen, TrialErrors, Twin,
+    apply, at_rate, candidate_models, choose_among, choose_model, choose_model_watched,
+    copied_signals, estimates_header, evaluate, evaluate_errors, evaluation_doubts,
+    explains_little, explains_nothing, fitted_trials, judge_model, m3_instructions,
+    m3_instructions_fixed, on_own_ranges, outside_range, pressure_column, push_estimate,
+    rank_signals,
 };
 pub use options::{
     Cause, MODELS_IN_WORDS, Memory, ModelKind, Options, PRESSURE, Robust, SpellingError, SplitBy,

@@ -6,55 +6,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use stretch_core::Target;
-use stretch_data::push_number;
-use stretch_link::{Answer, Frame};
-use stretch_receptor::code::{Adc, AdcCode};
-
-use super::Twin;
-
-/// One sample, as shown and recorded.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Sample {
-    pub time_s: f64,
-    /// The signal, in its unit; `None` for a sample that the board did not get.
-    pub signal: Option<f64>,
-    /// The estimate, in the unit of the reference; `None` if the board withholds it.
-    pub estimate: Option<f64>,
-    pub frame: Frame,
-    /// The target of the calibration, if its file contains it.
-    pub target: Option<Target>,
-}
-
-impl Sample {
-    pub(crate) fn new(time_s: f64, frame: Frame, adc: &Adc, target: Option<Target>) -> Self {
-        let estimate = match frame.answer {
-            Answer::Reading { thousandths, .. } => Some(f64::from(thousandths) / 1000.0),
-            _ => None,
-        };
-        Self { time_s, signal: adc.volts(AdcCode(frame.code)), estimate, frame, target }
-    }
-
-    /// Appends `time_s,signal,code,estimate,branch,domain`; missing values are empty.
-    pub(crate) fn push_line(&self, line: &mut Vec<u8>) {
-        push_number(line, self.time_s);
-        line.push(b',');
-        if let Some(signal) = self.signal {
-            push_number(line, signal);
-        }
-        // Writing to memory cannot fail.
-        let _ = writeln!(line, ",{},{}", self.frame.code, self.frame.answer.cells(self.target));
-    }
-}
-
-/// Returns the header of the lines, with the names from the calibration.
-pub(crate) fn header(twin: &Twin) -> String {
-    let estimate = match twin.unit.as_str() {
-        "" => "estimate".to_owned(),
-        unit => format!("estimate_{unit}"),
-    };
-    format!("time_s,{},adc_code,{estimate},branch,domain\n", twin.signal)
-}
+use stretch_calibrate::LinkSample;
 
 /// A trial file that grows by complete lines. It is removed on drop if it has no row.
 pub(crate) struct TrialFile {
@@ -97,7 +49,7 @@ impl TrialFile {
 
     /// Writes a sample with a single call, so that a killed program leaves complete lines. A sample
     /// without a signal is not written. It remains a gap in time.
-    pub(crate) fn push(&mut self, sample: &Sample) -> io::Result<()> {
+    pub(crate) fn push(&mut self, sample: &LinkSample) -> io::Result<()> {
         if sample.signal.is_none() {
             return Ok(());
         }

@@ -15,9 +15,8 @@ use std::{
 };
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use stretch_link::Counts;
+use stretch_calibrate::{LinkSample, LinkStatus};
 
-use super::trial_file::Sample;
 use crate::{
     commands::shared::is_ended,
     display::{Output, shows_progress, warn},
@@ -89,7 +88,7 @@ impl View {
         self.gone.load(SeqCst)
     }
 
-    pub(crate) fn push(&mut self, samples: &[Sample]) {
+    pub(crate) fn push(&mut self, samples: &[LinkSample]) {
         if !self.has_rows || samples.is_empty() {
             return;
         }
@@ -109,7 +108,7 @@ impl View {
     }
 
     /// Updates the status line, at most ten times per second.
-    pub(crate) fn refresh(&mut self, status: &Status) {
+    pub(crate) fn refresh(&mut self, status: &LinkStatus) {
         if self.refreshed.elapsed() >= REFRESH {
             self.refreshed = Instant::now();
             let _ = self.blocks.try_send(Shown::Status(status.live_line()));
@@ -142,93 +141,4 @@ fn status_line(has_rows: bool) -> ProgressBar {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
     bar
-}
-
-/// State of the link.
-#[derive(Debug, Default)]
-pub(crate) struct Status {
-    pub(super) connected: bool,
-    pub(super) counts: Counts,
-    /// Samples that the board did not get from its converter.
-    pub(super) missing: u64,
-    /// Number of codes outside the range of a converter of `adc_bits`, and the largest of them.
-    pub(super) beyond: u64,
-    pub(super) largest: i32,
-    pub(super) adc_bits: u8,
-    /// Number of the board's estimates that were compared with those computed here, and the largest
-    /// difference; `None` if the calibration has no live estimates.
-    pub(super) compared: Option<(u64, f64)>,
-    pub(super) unit: String,
-    /// The board's latest estimate.
-    pub(super) newest: Option<f64>,
-    /// Frames at which the board's clock had not advanced, although the sample period is at least
-    /// one tick of the clock.
-    pub(super) standing: u64,
-    /// Number of recorded rows, set at the end of a recording.
-    pub(super) rows: Option<u64>,
-}
-
-impl Status {
-    /// Returns the status line for a terminal.
-    pub(super) fn live_line(&self) -> String {
-        let newest = self.newest.map_or_else(
-            || "no estimate yet".to_owned(),
-            |estimate| format!("{estimate:.3} {}", self.unit).trim_end().to_owned(),
-        );
-        format!("{newest}; {}", self.line())
-    }
-
-    pub(super) fn line(&self) -> String {
-        let Counts { frames, lost, damaged, repeated, restarts, other_version } = self.counts;
-        let mut text = format!(
-            "{frames} frames, {lost} lost, {damaged} damaged, {repeated} repeated, {restarts} restarts"
-        );
-        if other_version > 0 {
-            text += &format!(", {other_version} of another version: update stretch or the board");
-        }
-        if frames == 0 && damaged > 0 {
-            text += "; no line is a frame, which begins with $S1: the board sends text, as the Arduino example Live does, or \
-                     has another speed (--port PATH:BAUD)";
-        }
-        match self.rows {
-            Some(0) => text += "; no row was recorded, so no file was written",
-            Some(rows) => text += &format!("; {rows} rows recorded"),
-            None => {}
-        }
-        if self.missing > 0 {
-            text += &format!(
-                "; {} samples that the board did not get from its converter",
-                self.missing
-            );
-        }
-        if self.standing > 0 {
-            text += &format!(
-                "; the board's clock did not advance at {} frames, which are not recorded; check where the board takes \
-                 its milliseconds from",
-                self.standing
-            );
-        }
-        let Self { beyond, largest, adc_bits, .. } = self;
-        if *beyond > 0 {
-            text += &format!(
-                "; {beyond} codes up to {largest} exceed a converter of {adc_bits} bits and are not recorded; give its bits \
-                 with --adc"
-            );
-        }
-        match self.compared {
-            Some((0, _)) if frames > 0 => text += "; no estimate was compared with the calibration",
-            Some((_, difference)) if frames > 0 => {
-                text += format!(
-                    "; the estimates differ from the calibration by up to {difference:.4} {}",
-                    self.unit
-                )
-                .trim_end();
-            }
-            _ => {}
-        }
-        if !self.connected {
-            text += "; waiting for the port";
-        }
-        text
-    }
 }

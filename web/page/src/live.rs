@@ -4,15 +4,12 @@
 use std::fmt::Write;
 
 use stretch_calibrate::{
-    Doubt, LiveReceptor, Seen, calibration_from_json, converter_reach, parse_adc,
+    Doubt, Link, LinkSample, LiveReceptor, Seen, Twin, calibration_from_json, converter_reach,
+    parse_adc,
 };
-use stretch_core::{Calibration, Interval, Runner, Target, Volts};
+use stretch_core::{Calibration, Interval};
 use stretch_data::push_number;
-use stretch_link::{Answer, Decoder, Event, Frame, TimeLine};
-use stretch_receptor::{
-    Reading, Receptor,
-    code::{Adc, AdcCode},
-};
+use stretch_receptor::Reading;
 use wasm_bindgen::prelude::*;
 
 use crate::said::{Said, in_page};
@@ -25,17 +22,13 @@ const LONGEST: usize = 256;
 #[derive(Debug)]
 pub struct Live {
     source: Source,
-    signal: String,
-    /// Column of the reference; `reference` without a calibration.
-    reference: String,
-    unit: String,
     /// Lines of the recording since the last call of `Live::lines`.
     lines: String,
 }
 
 #[derive(Debug)]
 enum Source {
-    Frames(Box<Frames>),
+    Frames(Box<Link>),
     Numbers(Box<Numbers>),
 }
 
@@ -48,8 +41,15 @@ impl Live {
     /// An invalid calibration file or converter.
     pub fn frames(adc: &str, record: &str) -> Result<Self, JsError> {
         let calibration = read(record)?;
-        let frames = Frames::new(parse_adc(adc).map_err(Said::from)?, calibration.as_ref())?;
-        Ok(Self::of(Source::Frames(Box::new(frames)), calibration))
+        let adc = parse_adc(adc).map_err(Said::from)?;
+        if let Some(spec) = calibration.as_ref().map(Calibration::spec) {
+            let range = Interval { min: spec.signal_range.min(), max: spec.signal_range.max() };
+            converter_reach(&spec.signal, range, &adc).map_err(Said::from)?;
+        }
+        let twin = calibration.as_ref().map_or(Ok(Twin::none()), Twin::new).map_err(Said::from)?;
+        let mut link = Link::new(twin, adc);
+        link.status.connected = true;
+        Ok(Self { source: Source::Frames(Box::new(link)), lines: String::new() })
     }
 
     /// Receives lines of numbers: a signal; time in seconds and signal; or time, reference and
@@ -60,31 +60,27 @@ impl Live {
     pub fn numbers(rate_hz: f64, record: &str) -> Result<Self, JsError> {
         let calibration = read(record)?;
         let numbers = Numbers::new(rate_hz, calibration.as_ref())?;
-        Ok(Self::of(Source::Numbers(Box::new(numbers)), calibration))
-    }
-
-    fn of(source: Source, calibration: Option<Calibration>) -> Self {
-        let signal = calibration.as_ref().map_or("signal", |c| c.spec().signal.as_str()).to_owned();
-        let unit = calibration.as_ref().map_or("", |c| c.spec().reference.unit()).to_owned();
-        let reference = calibration.as_ref().map_or("reference", |c| c.spec().reference.as_str());
-        let reference = reference.to_owned();
-        Self { source, signal, reference, unit, lines: String::new() }
+        Ok(Self { source: Source::Numbers(Box::new(numbers)), lines: String::new() })
     }
 
     /// Takes the bytes received at a time of the browser's clock. Returns a flat list of time,
     /// signal and estimate of each sample, with NaN for a missing value.
     pub fn take(&mut self, bytes: &[u8], now_s: f64) -> Vec<f64> {
-        let mut out = Vec::new();
-        for &byte in bytes {
-            let row = match &mut self.source {
-                Source::Frames(frames) => frames.push(byte, now_s, &mut self.lines),
-                Source::Numbers(numbers) => numbers.push(byte, &mut self.lines),
-            };
-            if let Some(row) = row {
-                out.extend(row);
+        match &mut self.source {
+            Source::Frames(link) => {
+                let samples = link.take(bytes, now_s);
+                let mut lines = Vec::new();
+                samples.iter().filter(|s| s.signal.is_some()).for_each(|s| s.push_line(&mut lines));
+                self.lines += &String::from_utf8_lossy(&lines);
+                let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+                let row = |s: &LinkSample| [s.time_s, or_nan(s.signal), or_nan(s.estimate)];
+                samples.iter().flat_map(row).collect()
+            }
+            Source::Numbers(numbers) => {
+                let rows = bytes.iter().filter_map(|&byte| numbers.push(byte, &mut self.lines));
+                rows.flatten().collect()
             }
         }
-        out
     }
 
     /// Returns the lines of the recording since the last call.
@@ -94,21 +90,19 @@ impl Live {
 
     /// Returns the header of these lines.
     pub fn header(&self) -> String {
-        let unit = if self.unit.is_empty() { String::new() } else { format!("_{}", self.unit) };
         match &self.source {
-            Source::Frames(_) => {
-                format!("time_s,{},adc_code,estimate{unit},branch,domain\n", self.signal)
-            }
-            Source::Numbers(_) => {
-                format!("time_s,{},{},estimate{unit}\n", self.signal, self.reference)
-            }
+            Source::Frames(link) => link.header(),
+            Source::Numbers(numbers) => numbers.header.clone(),
         }
     }
 
     /// Returns the state of the link as a sentence.
     pub fn status(&self) -> String {
         match &self.source {
-            Source::Frames(frames) => frames.status(&self.unit),
+            Source::Frames(link) => {
+                let line = link.status.line().replace("update stretch", "update the page");
+                in_page(&line.replace(" (--port PATH:BAUD)", ""))
+            }
             Source::Numbers(numbers) => {
                 let advice = match &numbers.first_damaged {
                     Some(line) if numbers.samples == 0 => format!(
@@ -140,126 +134,6 @@ fn read(record: &str) -> Result<Option<Calibration>, Said> {
     }
 }
 
-/// Frames of the live link, on one continuous time line even if the board restarts.
-#[derive(Debug)]
-struct Frames {
-    decoder: Decoder,
-    adc: Adc,
-    time_line: TimeLine,
-    twin: Option<Runner<Receptor<f64>>>,
-    target: Option<Target>,
-    /// Number of estimates compared with those computed here, and the largest difference.
-    compared: (u64, f64),
-    /// Samples that the board did not get from its converter.
-    missing: u64,
-    /// Number of codes outside the converter's range, and the largest of them.
-    beyond: (u64, i32),
-    /// Frames at which the board's clock had stopped.
-    standing: u64,
-}
-
-impl Frames {
-    fn new(adc: Adc, calibration: Option<&Calibration>) -> Result<Self, Said> {
-        if let Some(spec) = calibration.map(Calibration::spec) {
-            let range = Interval { min: spec.signal_range.min(), max: spec.signal_range.max() };
-            converter_reach(&spec.signal, range, &adc)?;
-        }
-        Ok(Self {
-            decoder: Decoder::new(),
-            adc,
-            time_line: TimeLine::new(
-                calibration.map_or(1e-3, |c| c.spec().sample_rate_hz.period_s()),
-            ),
-            twin: calibration.map(Receptor::new).transpose()?.map(Runner::new),
-            target: calibration.map(|c| c.spec().target),
-            compared: (0, 0.0),
-            missing: 0,
-            beyond: (0, 0),
-            standing: 0,
-        })
-    }
-
-    fn push(&mut self, byte: u8, now_s: f64, lines: &mut String) -> Option<[f64; 3]> {
-        let event = self.decoder.push(byte)?;
-        let frame = event.frame()?;
-        if let Some(twin) = self.twin.as_mut().filter(|_| !matches!(event, Event::Frame(_))) {
-            // The board has seen samples that did not arrive here.
-            twin.reset();
-        }
-        let time_s = self.time_line.time_s(&event, now_s);
-        let signal = self.adc.volts(AdcCode(frame.code));
-        let own = self.twin.as_mut().map(|twin| twin.step(Volts(signal.unwrap_or(f64::NAN))));
-        let estimate = match frame.answer {
-            Answer::Reading { thousandths, branch, .. } => {
-                let estimate = f64::from(thousandths) / 1000.0;
-                if let Some(Ok(own)) = own.filter(|own| own.is_ok_and(|own| own.branch == branch)) {
-                    let worst = self.compared.1.max((estimate - own.estimate).abs());
-                    self.compared = (self.compared.0 + 1, worst);
-                }
-                estimate
-            }
-            _ => f64::NAN,
-        };
-        // A sample without a known time becomes no row.
-        let Some(time_s) = time_s else {
-            self.standing += 1;
-            return None;
-        };
-        match signal {
-            Some(signal) => push_line(lines, time_s, signal, &frame, self.target),
-            None if frame.code < 0 => self.missing += 1,
-            None => self.beyond = (self.beyond.0 + 1, self.beyond.1.max(frame.code)),
-        }
-        Some([time_s, signal.unwrap_or(f64::NAN), estimate])
-    }
-
-    fn status(&self, unit: &str) -> String {
-        let c = self.decoder.counts();
-        let mut text = format!(
-            "{} frames, {} lost, {} damaged, {} repeated, {} restarts",
-            c.frames, c.lost, c.damaged, c.repeated, c.restarts
-        );
-        if c.other_version > 0 {
-            text +=
-                &format!(", {} of another version: update the page or the board", c.other_version);
-        }
-        if self.missing > 0 {
-            text += &format!(
-                "; {} samples that the board did not get from its converter",
-                self.missing
-            );
-        }
-        if let (1.., largest) = self.beyond {
-            let (count, bits) = (self.beyond.0, self.adc.spec().bits);
-            text += &format!(
-                "; {count} codes up to {largest} exceed a converter of {bits} bits and are not recorded"
-            );
-        }
-        if self.standing > 0 {
-            text += &format!(
-                "; the board's clock did not advance at {} frames, which are not recorded",
-                self.standing
-            );
-        }
-        if self.compared.0 > 0 {
-            text += &format!(
-                "; the estimates differ from the calibration by up to {:.4} {unit}",
-                self.compared.1
-            );
-        }
-        text
-    }
-}
-
-/// Appends a row in the format of `stretch listen`.
-fn push_line(lines: &mut String, time_s: f64, signal: f64, frame: &Frame, target: Option<Target>) {
-    push(lines, time_s);
-    lines.push(',');
-    push(lines, signal);
-    // Writing to a string cannot fail.
-    let _ = writeln!(lines, ",{},{}", frame.code, frame.answer.cells(target));
-}
-
 fn push(lines: &mut String, value: f64) {
     let mut number = Vec::new();
     push_number(&mut number, value);
@@ -270,6 +144,8 @@ fn push(lines: &mut String, value: f64) {
 #[derive(Debug)]
 struct Numbers {
     line: Vec<u8>,
+    /// Header of the lines of the recording.
+    header: String,
     rate_hz: f64,
     lines: u64,
     damaged: u64,
@@ -306,8 +182,18 @@ impl Numbers {
         if !(1e-3..=1e7).contains(&rate_hz) {
             return Err(Said(format!("{rate_hz} is not a rate between 1e-3 and 1e7 Hz")));
         }
+        let header = calibration.map(Calibration::spec).map_or_else(
+            || "time_s,signal,reference,estimate\n".to_owned(),
+            |spec| {
+                let (signal, reference) = (spec.signal.as_str(), spec.reference.as_str());
+                let unit = spec.reference.unit();
+                let joint = if unit.is_empty() { "" } else { "_" };
+                format!("time_s,{signal},{reference},estimate{joint}{unit}\n")
+            },
+        );
         Ok(Self {
             line: Vec::new(),
+            header,
             rate_hz,
             lines: 0,
             damaged: 0,

@@ -7,6 +7,7 @@ mod doubt;
 mod estimates;
 mod evaluate;
 mod left_out;
+mod link;
 mod model_choice;
 mod model_words;
 mod reach;
@@ -23,6 +24,7 @@ pub use evaluate::{
     evaluate_errors, evaluate_methods,
 };
 pub use left_out::{Judged, judge_model};
+pub use link::{Link, LinkSample, LinkStatus, Twin};
 pub use model_choice::{
     Candidate, ModelChoice, ModelRow, candidate_models, choose_among, choose_model,
     choose_model_watched, copied_signals, m3_instructions, m3_instructions_fixed, rank_signals,

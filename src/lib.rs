@@ -161,7 +161,7 @@ pub fn run() -> ExitCode {
     match (result, display::lost()) {
         (Err(error), _) if is_unread && is_broken_pipe(&error) => ExitCode::SUCCESS,
         (Err(error), _) => {
-            display::fail(message(&error));
+            display::fail(stretch_data::error_sentence(error.as_ref()));
             ExitCode::FAILURE
         }
         (Ok(()), Some(kind)) if !is_unread => {
@@ -194,30 +194,6 @@ fn explain(answer: &clap::Error) -> ExitCode {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => ExitCode::FAILURE,
         _ => ExitCode::SUCCESS,
     }
-}
-
-/// Joins an error and its causes to one sentence. A cause that the sentence already contains is
-/// left out.
-fn message(error: &anyhow::Error) -> String {
-    let mut text = without_numbers(&error.to_string());
-    for cause in error.chain().skip(1).map(|cause| without_numbers(&cause.to_string())) {
-        if cause.starts_with(&format!("{text}:")) {
-            text = cause;
-        } else if !text.contains(&cause) {
-            text = format!("{text}: {cause}");
-        }
-    }
-    stretch_data::files::without_temporary_names(&text)
-}
-
-/// Removes Rust's `(os error 28)` from a text, because it repeats the text before it.
-fn without_numbers(text: &str) -> String {
-    let mut parts = text.split(" (os error ");
-    let mut text = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        text += part.split_once(')').map_or(part, |(_, rest)| rest);
-    }
-    text
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

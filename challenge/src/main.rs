@@ -145,10 +145,7 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) if is_stopped() => ExitCode::from(130),
         Err(error) => {
-            eprintln!(
-                "challenge: {}",
-                stretch_data::files::without_temporary_names(&format!("{error:#}"))
-            );
+            eprintln!("challenge: {}", stretch_data::error_sentence(error.as_ref()));
             ExitCode::FAILURE
         }
     }

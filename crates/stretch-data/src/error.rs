@@ -1,7 +1,7 @@
 //! Errors for wrong files, and helpers for messages: shortened fields, lists of names, and the
 //! nearest known name.
 
-use std::{fmt, fs, io, path::Path};
+use std::{error::Error, fmt, fs, io, path::Path};
 
 use crate::{column::unit, files::FileError};
 
@@ -282,6 +282,36 @@ pub fn rename_options(text: &str, names: &[(&str, &str)]) -> String {
         }
     }
     out
+}
+
+/// Joins an error and its causes to one sentence, without Rust's numbers of system errors and without names of temporary
+/// files. A cause that the sentence already contains is left out.
+///
+/// ```
+/// let error = std::io::Error::other("the disk is full (os error 28)");
+/// assert_eq!(stretch_data::error_sentence(&error), "the disk is full");
+/// ```
+pub fn error_sentence(error: &dyn Error) -> String {
+    let mut text = without_numbers(&error.to_string());
+    let causes = std::iter::successors(error.source(), |cause| (*cause).source());
+    for cause in causes.map(|cause| without_numbers(&cause.to_string())) {
+        if cause.starts_with(&format!("{text}:")) {
+            text = cause;
+        } else if !text.contains(&cause) {
+            text = format!("{text}: {cause}");
+        }
+    }
+    crate::files::without_temporary_names(&text)
+}
+
+/// Removes Rust's `(os error 28)` from a text, because it repeats the text before it.
+fn without_numbers(text: &str) -> String {
+    let mut parts = text.split(" (os error ");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        text += part.split_once(')').map_or(part, |(_, rest)| rest);
+    }
+    text
 }
 
 /// Joins names into a phrase: `a, b and c`, or `nothing` for an empty list.

@@ -20,7 +20,7 @@ mod write;
 pub use column::{Quantity, spelt_unit, unit, unit_of, written_unit};
 pub use data_set::{DataSet, Split, TrialEntry, TrialKind, digest_of, is_digest};
 pub use digits::{in_digits, significant};
-pub use error::{DataError, Place, listed, nearest, rename_options, shown};
+pub use error::{DataError, Place, error_sentence, listed, nearest, rename_options, shown};
 pub use even::{Even, EvenPart, EvenSpec, Rows};
 pub use even_session::{EvenSession, EvenTrial, SessionTrial};
 pub use rig_file::{EffectEntry, Parameter, RigFile, from_zero};

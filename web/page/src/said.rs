@@ -3,7 +3,7 @@
 use std::{error::Error, fmt};
 
 use serde::{Serialize, de::DeserializeOwned};
-use stretch_data::rename_options;
+use stretch_data::{error_sentence, rename_options};
 
 /// Options of the program, and the fields of the page with the same meaning.
 const FIELDS: [(&str, &str); 7] = [
@@ -39,18 +39,8 @@ impl From<Said> for wasm_bindgen::JsError {
 }
 
 impl<E: Error> From<E> for Said {
-    /// Joins the error and its causes. A cause that the text already contains is not repeated.
     fn from(error: E) -> Self {
-        let mut told = error.to_string();
-        let mut cause = error.source();
-        while let Some(one) = cause {
-            let text = one.to_string();
-            if !told.contains(&text) {
-                told = format!("{told}: {text}");
-            }
-            cause = one.source();
-        }
-        Self(told)
+        Self(error_sentence(&error))
     }
 }
 

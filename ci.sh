@@ -14,7 +14,7 @@ cd "$(dirname "$0")"
 BOARDS=$(grep -lE '^#!\[(cfg_attr\(not\(feature = "calibrate"\), )?no_std' crates/*/src/lib.rs | cut -d / -f 2)
 TARGETS="thumbv7m-none-eabi thumbv7em-none-eabihf"
 # what plain `cargo test` does not compile: the other members, and readers that take long to build. The page has a gate of its own.
-FLEET="stretch-fleet stretch-fleet-cluster stretch-fleet-program stretch-fleet-python"
+FLEET="stretch-fleet stretch-fleet-program stretch-fleet-python"
 FLEET_MB=6000
 OTHERS="stretch-benches stretch-blind stretch-challenge stretch-fmu stretch-python stretch-recording"
 

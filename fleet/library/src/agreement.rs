@@ -8,20 +8,14 @@ use datafusion::{
             Array, ArrayRef, BinaryBuilder, BooleanArray, Float64Builder, StructArray,
             UInt64Builder,
         },
-        datatypes::{DataType, Field, FieldRef, Fields},
+        datatypes::{DataType, Field, Fields},
     },
     common::{Result, cast::as_float64_array, exec_datafusion_err, exec_err},
-    logical_expr::{
-        Accumulator, AggregateUDF, AggregateUDFImpl, EmitTo, GroupsAccumulator, Signature,
-        Volatility,
-        function::{AccumulatorArgs, StateFieldsArgs},
-    },
+    logical_expr::{EmitTo, GroupsAccumulator},
 };
 use stretch_metrics::{Agreement, AgreementSpec, Delta};
 
-use crate::one::{One, state_of_each_row, states};
-
-const NAME: &str = "agreement";
+use crate::one::{state_of_each_row, states};
 
 /// Result columns in addition to the counts.
 const FIGURES: [(&str, Figure); 13] = [
@@ -42,61 +36,16 @@ const FIGURES: [(&str, Figure); 13] = [
 
 type Figure = fn(&Agreement<f64>) -> Option<f64>;
 
-fn fields() -> Fields {
+/// Returns the fields of the result.
+pub(crate) fn fields() -> Fields {
     let count = |name: &str| Field::new(name, DataType::UInt64, true);
     let figures = FIGURES.iter().map(|(name, _)| Field::new(*name, DataType::Float64, true));
     [count("rows"), count("rows_left_out")].into_iter().chain(figures).collect()
 }
 
-#[derive(Debug, PartialEq, Eq, Hash)]
-struct AgreementFunction {
-    signature: Signature,
-}
-
-/// Returns the aggregate function.
-pub(crate) fn function() -> Arc<AggregateUDF> {
-    let signature = Signature::exact(vec![DataType::Float64; 2], Volatility::Immutable);
-    Arc::new(AggregateUDF::new_from_impl(AgreementFunction { signature }))
-}
-
-impl AggregateUDFImpl for AgreementFunction {
-    fn name(&self) -> &str {
-        NAME
-    }
-
-    fn signature(&self) -> &Signature {
-        &self.signature
-    }
-
-    fn return_type(&self, _: &[DataType]) -> Result<DataType> {
-        Ok(DataType::Struct(fields()))
-    }
-
-    fn state_fields(&self, args: StateFieldsArgs) -> Result<Vec<FieldRef>> {
-        let name = format!("{}[state]", args.name);
-        Ok(vec![Arc::new(Field::new(name, DataType::Binary, true))])
-    }
-
-    fn accumulator(&self, _: AccumulatorArgs) -> Result<Box<dyn Accumulator>> {
-        Ok(Box::new(One::new(NAME, Agreements::default())))
-    }
-
-    fn groups_accumulator_supported(&self, args: AccumulatorArgs) -> bool {
-        !args.is_distinct
-    }
-
-    fn create_groups_accumulator(&self, _: AccumulatorArgs) -> Result<Box<dyn GroupsAccumulator>> {
-        Ok(Box::new(Agreements::default()))
-    }
-
-    fn order_sensitivity(&self) -> datafusion::logical_expr::utils::AggregateOrderSensitivity {
-        datafusion::logical_expr::utils::AggregateOrderSensitivity::Insensitive
-    }
-}
-
 /// The agreements of many groups, 200 bytes each.
 #[derive(Debug, Default)]
-struct Agreements(Vec<Agreement<f64>>);
+pub(crate) struct Agreements(Vec<Agreement<f64>>);
 
 impl GroupsAccumulator for Agreements {
     fn update_batch(

@@ -1,5 +1,5 @@
-//! Fits as aggregate functions: `poly13_fit`, `linear_fit`, `polyij_fit`, `poly13_state`,
-//! `poly13_merge`.
+//! The aggregate functions: the fits `poly13_fit`, `linear_fit`, `polyij_fit`, `poly13_state` and `poly13_merge`, and
+//! `agreement`.
 
 use std::sync::Arc;
 
@@ -20,6 +20,7 @@ use stretch_core::{Degree, MAX_DEGREE, MAX_TERMS};
 
 use crate::{
     about::About,
+    agreement::{self, Agreements},
     answer::{answers, fields},
     one::{One, state_of_each_row, states},
     triangles::{Outcome, Triangles},
@@ -37,6 +38,7 @@ enum Kind {
     PolyIj,
     State,
     Merge,
+    Agreement,
 }
 
 impl Kind {
@@ -47,6 +49,7 @@ impl Kind {
             Self::PolyIj => "polyij_fit",
             Self::State => "poly13_state",
             Self::Merge => "poly13_merge",
+            Self::Agreement => "agreement",
         }
     }
 
@@ -54,7 +57,7 @@ impl Kind {
         use DataType::{Binary, BinaryView, Float64, Int64, LargeBinary};
         let types = match self {
             Self::Poly13 | Self::State => TypeSignature::Exact(vec![Float64; 3]),
-            Self::Line => TypeSignature::Exact(vec![Float64; 2]),
+            Self::Line | Self::Agreement => TypeSignature::Exact(vec![Float64; 2]),
             Self::PolyIj => TypeSignature::Exact(vec![Int64, Int64, Float64, Float64, Float64]),
             Self::Merge => TypeSignature::Uniform(1, vec![BinaryView, Binary, LargeBinary]),
         };
@@ -69,20 +72,33 @@ impl Kind {
 
 /// An aggregate function of SQL.
 #[derive(Debug, PartialEq, Eq, Hash)]
-struct FitFunction {
+struct Function {
     kind: Kind,
     signature: Signature,
 }
 
 /// Returns all aggregate functions of this file.
 pub(crate) fn functions() -> impl Iterator<Item = Arc<AggregateUDF>> {
-    [Kind::Poly13, Kind::Line, Kind::PolyIj, Kind::State, Kind::Merge].into_iter().map(|kind| {
+    use Kind::{Agreement, Line, Merge, Poly13, PolyIj, State};
+    [Poly13, Line, PolyIj, State, Merge, Agreement].into_iter().map(|kind| {
         let signature = kind.signature();
-        Arc::new(AggregateUDF::new_from_impl(FitFunction { kind, signature }))
+        Arc::new(AggregateUDF::new_from_impl(Function { kind, signature }))
     })
 }
 
-impl FitFunction {
+impl Function {
+    fn groups(&self, args: &AccumulatorArgs) -> Result<Box<dyn GroupsAccumulator + Sync>> {
+        if self.kind == Kind::Agreement {
+            return Ok(Box::<Agreements>::default());
+        }
+        let degree = self.degree(args)?;
+        Ok(match degree.terms() {
+            terms if terms <= LINE => Box::new(self.fits::<LINE>(degree, args)?),
+            terms if terms <= POLY13 => Box::new(self.fits::<POLY13>(degree, args)?),
+            _ => Box::new(self.fits::<MAX_TERMS>(degree, args)?),
+        })
+    }
+
     fn degree(&self, args: &AccumulatorArgs) -> Result<Degree> {
         match self.kind {
             Kind::PolyIj => {
@@ -128,7 +144,7 @@ fn power(expr: &Arc<dyn PhysicalExpr>, name: &str) -> Result<u8> {
     }
 }
 
-impl AggregateUDFImpl for FitFunction {
+impl AggregateUDFImpl for Function {
     fn name(&self) -> &str {
         self.kind.name()
     }
@@ -138,7 +154,11 @@ impl AggregateUDFImpl for FitFunction {
     }
 
     fn return_type(&self, _: &[DataType]) -> Result<DataType> {
-        Ok(if self.kind == Kind::State { DataType::Binary } else { DataType::Struct(fields()) })
+        Ok(match self.kind {
+            Kind::State => DataType::Binary,
+            Kind::Agreement => DataType::Struct(agreement::fields()),
+            _ => DataType::Struct(fields()),
+        })
     }
 
     fn state_fields(&self, args: StateFieldsArgs) -> Result<Vec<FieldRef>> {
@@ -147,15 +167,7 @@ impl AggregateUDFImpl for FitFunction {
     }
 
     fn accumulator(&self, args: AccumulatorArgs) -> Result<Box<dyn Accumulator>> {
-        let name = self.name();
-        let degree = self.degree(&args)?;
-        Ok(match degree.terms() {
-            terms if terms <= LINE => Box::new(One::new(name, self.fits::<LINE>(degree, &args)?)),
-            terms if terms <= POLY13 => {
-                Box::new(One::new(name, self.fits::<POLY13>(degree, &args)?))
-            }
-            _ => Box::new(One::new(name, self.fits::<MAX_TERMS>(degree, &args)?)),
-        })
+        Ok(Box::new(One::new(self.name(), self.groups(&args)?)))
     }
 
     fn groups_accumulator_supported(&self, args: AccumulatorArgs) -> bool {
@@ -166,12 +178,7 @@ impl AggregateUDFImpl for FitFunction {
         &self,
         args: AccumulatorArgs,
     ) -> Result<Box<dyn GroupsAccumulator>> {
-        let degree = self.degree(&args)?;
-        Ok(match degree.terms() {
-            terms if terms <= LINE => Box::new(self.fits::<LINE>(degree, &args)?),
-            terms if terms <= POLY13 => Box::new(self.fits::<POLY13>(degree, &args)?),
-            _ => Box::new(self.fits::<MAX_TERMS>(degree, &args)?),
-        })
+        Ok(self.groups(&args)?)
     }
 
     fn order_sensitivity(&self) -> datafusion::logical_expr::utils::AggregateOrderSensitivity {

@@ -24,7 +24,7 @@ pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Returns the aggregate functions, for a session or the registry of an executor.
 pub fn aggregates() -> Vec<Arc<AggregateUDF>> {
-    fit::functions().chain([agreement::function()]).collect()
+    fit::functions().collect()
 }
 
 /// Returns the scalar functions, for a session or the registry of an executor.

@@ -31,20 +31,20 @@ pub(crate) fn state_of_each_row(
 }
 
 /// An accumulator of a single group, implemented with an accumulator of many groups.
-pub(crate) struct One<G> {
+pub(crate) struct One {
     name: String,
-    groups: G,
+    groups: Box<dyn GroupsAccumulator + Sync>,
     zeros: Vec<usize>,
 }
 
-impl<G> fmt::Debug for One<G> {
+impl fmt::Debug for One {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "One({})", self.name)
     }
 }
 
-impl<G: GroupsAccumulator + Sync> One<G> {
-    pub(crate) fn new(name: &str, groups: G) -> Self {
+impl One {
+    pub(crate) fn new(name: &str, groups: Box<dyn GroupsAccumulator + Sync>) -> Self {
         Self { name: name.to_owned(), groups, zeros: Vec::new() }
     }
 
@@ -54,7 +54,7 @@ impl<G: GroupsAccumulator + Sync> One<G> {
     }
 }
 
-impl<G: GroupsAccumulator + Sync> Accumulator for One<G> {
+impl Accumulator for One {
     fn update_batch(&mut self, values: &[ArrayRef]) -> Result<()> {
         self.indices(values);
         self.groups.update_batch(values, &self.zeros, None, 1)

@@ -1,8 +1,10 @@
-//! The program `stretch-fleet`, for lakes of trials: folders of Parquet files, one per trial.
+//! The programs `stretch-fleet`, for lakes of trials (folders of Parquet files, one per trial), and `stretch-scheduler` and
+//! `stretch-executor`, which run its queries on many machines.
 
 mod answers;
 mod calibrate;
 mod candidates;
+pub mod cluster;
 mod data_sets;
 mod diagnose;
 mod drift;
@@ -83,7 +85,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> ExitCode {
     match result.unwrap_or_else(|panic| Err(gave_up(panic.as_ref()))) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            warn(format!("stretch-fleet: {}", sentence(&error)));
+            warn(format!("stretch-fleet: {}", stretch_data::error_sentence(error.as_ref())));
             ExitCode::FAILURE
         }
     }
@@ -94,17 +96,6 @@ fn gave_up(panic: &(dyn Any + Send)) -> anyhow::Error {
         "a reader failed: {}. Damaged rows of a file can cause this: ingest its trial again, or report an error of this program",
         message(panic)
     )
-}
-
-/// Joins the error and its causes. A cause that the text already contains is not repeated.
-fn sentence(error: &anyhow::Error) -> String {
-    let mut told = error.to_string();
-    for cause in error.chain().skip(1).map(ToString::to_string) {
-        if !told.contains(&cause) {
-            told = format!("{told}: {cause}");
-        }
-    }
-    stretch_data::files::without_temporary_names(&told)
 }
 
 #[cfg(test)]

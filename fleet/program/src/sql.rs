@@ -10,10 +10,10 @@ use datafusion::{
     execution::{context::SQLOptions, runtime_env::RuntimeEnvBuilder},
     prelude::{SessionConfig, SessionContext},
 };
-use stretch_fleet_cluster::connect;
 
 use crate::{
     answers::{csv, flat, table, write_records},
+    cluster::connect,
     data_sets::lake_with_trials,
     lake::{Lake, register},
     lock::{Lock, RECORDS_DEPTH},

@@ -8,6 +8,9 @@ use std::{
 
 use crate::support::{PROGRAM, bytes, only, parquet, said};
 
+const SCHEDULER: &str = env!("CARGO_BIN_EXE_stretch-scheduler");
+const EXECUTOR: &str = env!("CARGO_BIN_EXE_stretch-executor");
+
 /// Processes that are killed at the end of the test.
 struct Cluster(Vec<Child>);
 
@@ -22,22 +25,18 @@ impl Drop for Cluster {
 
 /// Starts a cluster and returns its URL.
 fn cluster() -> (Cluster, String) {
-    let beside = |name: &str| Path::new(PROGRAM).with_file_name(name);
-    let [scheduler, executor] = ["stretch-scheduler", "stretch-executor"].map(beside);
-    let is_built = scheduler.exists() && executor.exists();
-    assert!(is_built, "{} is not built: test the whole workspace", scheduler.display());
-    let start = |program: &Path, words: &[&str]| {
+    let start = |program: &str, words: &[&str]| {
         let mut command = Command::new(program);
         command.args(words).stdout(Stdio::piped()).stderr(Stdio::null());
         command.spawn().expect("it starts")
     };
-    let mut all = Cluster(vec![start(&scheduler, &["--port", "0"])]);
+    let mut all = Cluster(vec![start(SCHEDULER, &["--port", "0"])]);
     let mut line = String::new();
     let out = all.0[0].stdout.take().expect("it says where it listens");
     BufReader::new(out).read_line(&mut line).expect("a line");
     let url = line.split_whitespace().last().expect("a URL").to_owned();
     for _ in 0..3 {
-        all.0.push(start(&executor, &["--scheduler", url.trim_start_matches("df://")]));
+        all.0.push(start(EXECUTOR, &["--scheduler", url.trim_start_matches("df://")]));
     }
     (all, url)
 }
@@ -132,7 +131,6 @@ fn ip(words: &[&str]) {
 #[test]
 #[ignore = "needs root and network namespaces; gate.sh runs it where they can be made"]
 fn with_netns_the_recipe_for_many_machines_answers() {
-    let beside = |name: &str| Path::new(PROGRAM).with_file_name(name);
     let folder = tempfile::tempdir().unwrap();
     let [lake, here, there] = ["lake", "here", "there"].map(|name| folder.path().join(name));
     said("make --lake {} --sensors 3 --days 4 --rows 200", &[&lake]);
@@ -140,17 +138,17 @@ fn with_netns_the_recipe_for_many_machines_answers() {
     std::fs::remove_dir_all(lake.join("states")).unwrap();
     let machines = Machines::new();
     let mut all = Cluster(Vec::new());
-    let mut start = |machine: usize, name: &str, words: &[&str]| {
-        let mut command = machines.on(machine, &beside(name));
+    let mut start = |machine: usize, program: &str, words: &[&str]| {
+        let mut command = machines.on(machine, Path::new(program));
         let mut child = command.args(words).stdout(Stdio::piped()).spawn().expect("it starts");
         let mut line = String::new();
         BufReader::new(child.stdout.take().unwrap()).read_line(&mut line).expect("a line");
         all.0.push(child);
         line
     };
-    let line = start(0, "stretch-scheduler", &["--bind-host", "10.0.0.1", "--insecure"]);
+    let line = start(0, SCHEDULER, &["--bind-host", "10.0.0.1", "--insecure"]);
     assert!(line.trim_end().ends_with("df://10.0.0.1:50050"), "{line}");
-    let line = start(1, "stretch-executor", &["--scheduler", "10.0.0.1:50050", "--insecure"]);
+    let line = start(1, EXECUTOR, &["--scheduler", "10.0.0.1:50050", "--insecure"]);
     assert!(line.starts_with("executor 10.0.0.2:"), "{line}");
     let output = machines
         .on(0, Path::new(PROGRAM))

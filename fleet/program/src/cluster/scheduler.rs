@@ -13,11 +13,12 @@ use ballista_scheduler::{
 };
 use datafusion::prelude::SessionConfig;
 
-use crate::{
+use super::{
     codec::{Marked, Release},
-    ports::{address, before_port, chosen, guard, say},
+    ports::{address, before_port, chosen, guard},
     state_with_functions,
 };
+use crate::show::say;
 
 /// What a scheduler is started with.
 #[derive(Debug, Clone, clap::Parser)]
@@ -65,7 +66,7 @@ pub async fn run_scheduler(options: SchedulerOptions) -> anyhow::Result<()> {
         override_physical_codec: Some(Marked::<BallistaPhysicalExtensionCodec>::new(&release)),
         ..SchedulerConfig::default()
     };
-    say(format_args!("scheduler {} at df://{address}", release.version));
+    say(format!("scheduler {} at df://{address}", release.version))?;
     let cluster = BallistaCluster::new_from_config(&config).await.map_err(|e| anyhow!("{e}"))?;
     start_server(cluster, address, Arc::new(config)).await.map_err(|e| anyhow!("{address}: {e}"))
 }

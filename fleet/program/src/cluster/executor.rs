@@ -10,11 +10,12 @@ use ballista_core::{
 };
 use ballista_executor::executor_process::{ExecutorProcessConfig, start_executor_process};
 
-use crate::{
+use super::{
     codec::{Marked, Release},
-    ports::{address, address_towards, before_port, chosen, guard, say},
+    ports::{address, address_towards, before_port, chosen, guard},
     state_with_functions,
 };
+use crate::show::say;
 
 /// What an executor is started with.
 #[derive(Debug, Clone, clap::Parser)]
@@ -102,6 +103,6 @@ pub async fn run_executor(options: ExecutorOptions) -> anyhow::Result<()> {
         override_physical_codec: Some(Marked::<BallistaPhysicalExtensionCodec>::new(&release)),
         ..ExecutorProcessConfig::default()
     };
-    say(format_args!("{} {} for df://{host}:{scheduler_port}", release.who, release.version));
+    say(format!("{} {} for df://{host}:{scheduler_port}", release.who, release.version))?;
     start_executor_process(Arc::new(config)).await.map_err(|e| anyhow!("{}: {e}", release.who))
 }

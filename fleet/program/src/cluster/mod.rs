@@ -6,7 +6,7 @@
 //! # async fn ask() -> datafusion::error::Result<()> {
 //! use datafusion::prelude::{ParquetReadOptions, SessionConfig};
 //! let session =
-//!     stretch_fleet_cluster::connect("df://127.0.0.1:50050", SessionConfig::new(), Default::default()).await?;
+//!     stretch_fleet_program::cluster::connect("df://127.0.0.1:50050", SessionConfig::new(), Default::default()).await?;
 //! session.register_parquet("trials", "/srv/lake/trials", ParquetReadOptions::default()).await?;
 //! session.sql("select sensor, poly13_fit(rate, bridge_v, contraction) from trials group by sensor").await?.show().await
 //! # }
@@ -28,7 +28,7 @@ use datafusion::{
     prelude::{SessionConfig, SessionContext},
 };
 
-pub use codec::Release;
+use codec::Release;
 pub use executor::{ExecutorOptions, run_executor};
 pub use scheduler::{SchedulerOptions, run_scheduler};
 
@@ -63,7 +63,7 @@ pub async fn connect(
 }
 
 /// Returns the session state with our functions, for a client, a scheduler or an executor.
-pub(crate) fn state_with_functions() -> SessionStateBuilder {
+fn state_with_functions() -> SessionStateBuilder {
     SessionStateBuilder::new()
         .with_aggregate_functions(stretch_fleet::aggregates())
         .with_scalar_functions(stretch_fleet::scalars())

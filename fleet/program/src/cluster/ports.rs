@@ -1,12 +1,10 @@
 //! Chooses and prints the address where a process of the cluster listens.
 
-use std::{
-    fmt,
-    io::{self, Write},
-    net::{IpAddr, Ipv4Addr, Ipv6Addr, TcpListener, ToSocketAddrs, UdpSocket},
-};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, TcpListener, ToSocketAddrs, UdpSocket};
 
 use anyhow::{Context, ensure};
+
+use crate::show::warn;
 
 /// Resolves a host name to an address, preferring IPv4.
 pub(crate) fn address(host: &str) -> anyhow::Result<IpAddr> {
@@ -49,11 +47,9 @@ pub(crate) fn guard(who: &str, listens_on: IpAddr, is_insecure: bool) -> anyhow:
         "a {who} on {listens_on} obeys everyone who reaches it: nothing is encrypted, no caller is authenticated, and queries \
          read and write files as this user. Listen on 127.0.0.1, or use a separate network for the cluster and add --insecure"
     );
-    // If the warning cannot be written, there is no way to report that.
-    let _ = writeln!(
-        io::stderr().lock(),
+    warn(format!(
         "WARNING: INSECURE: this {who} on {listens_on} obeys everyone who reaches it; keep that network closed"
-    );
+    ));
     Ok(())
 }
 
@@ -66,9 +62,4 @@ pub(crate) fn chosen(host: IpAddr, port: u16) -> anyhow::Result<u16> {
     let listener =
         TcpListener::bind((host, 0)).with_context(|| format!("no free port at {host}"))?;
     Ok(listener.local_addr()?.port())
-}
-
-/// Prints a line to standard output. A closed standard output is ignored.
-pub(crate) fn say(line: fmt::Arguments<'_>) {
-    let _ = writeln!(io::stdout().lock(), "{line}");
 }

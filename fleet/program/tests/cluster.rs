@@ -18,7 +18,7 @@ use datafusion::{
     dataframe::DataFrameWriteOptions,
     prelude::{ParquetReadOptions, SessionConfig, SessionContext},
 };
-use stretch_fleet_cluster::connect;
+use stretch_fleet_program::cluster::connect;
 use tempfile::TempDir;
 
 /// Time after which a silent executor is given up, in seconds. A shared machine does not delay an

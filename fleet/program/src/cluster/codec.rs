@@ -24,17 +24,17 @@ use datafusion_proto::{
 const MARK: &str = "stretch-fleet ";
 
 /// A release of the functions, and the process that has it.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Release {
+#[derive(Debug, Clone)]
+pub(crate) struct Release {
     /// The process, such as `executor 10.0.0.7:50051`.
-    pub who: String,
+    pub(crate) who: String,
     /// The release, such as `0.1.0`.
-    pub version: String,
+    pub(crate) version: String,
 }
 
 impl Release {
     /// Returns the release with which this program was built.
-    pub fn own(who: impl Into<String>) -> Self {
+    pub(crate) fn own(who: impl Into<String>) -> Self {
         Self { who: who.into(), version: stretch_fleet::VERSION.to_owned() }
     }
 
@@ -82,16 +82,29 @@ impl<C: Default> Marked<C> {
     }
 }
 
-impl<C> Marked<C> {
-    fn decoded_aggregate(&self, name: &str, buffer: &[u8]) -> Result<Arc<AggregateUDF>> {
-        self.release.check(name, buffer)?;
-        aggregate(name).map_or_else(|| not_impl_err!("{name} is not an aggregate function"), Ok)
-    }
+/// The methods of either codec that write the release behind a function, and check it.
+macro_rules! marked_functions {
+    () => {
+        fn try_decode_udf(&self, name: &str, buffer: &[u8]) -> Result<Arc<ScalarUDF>> {
+            self.release.check(name, buffer)?;
+            scalar(name).map_or_else(|| not_impl_err!("{name} is not a scalar function"), Ok)
+        }
 
-    fn decoded_scalar(&self, name: &str, buffer: &[u8]) -> Result<Arc<ScalarUDF>> {
-        self.release.check(name, buffer)?;
-        scalar(name).map_or_else(|| not_impl_err!("{name} is not a scalar function"), Ok)
-    }
+        fn try_encode_udf(&self, node: &ScalarUDF, buffer: &mut Vec<u8>) -> Result<()> {
+            self.release.write(scalar(node.name()).is_some(), buffer);
+            Ok(())
+        }
+
+        fn try_decode_udaf(&self, name: &str, buffer: &[u8]) -> Result<Arc<AggregateUDF>> {
+            self.release.check(name, buffer)?;
+            aggregate(name).map_or_else(|| not_impl_err!("{name} is not an aggregate function"), Ok)
+        }
+
+        fn try_encode_udaf(&self, node: &AggregateUDF, buffer: &mut Vec<u8>) -> Result<()> {
+            self.release.write(aggregate(node.name()).is_some(), buffer);
+            Ok(())
+        }
+    };
 }
 
 impl<C: LogicalExtensionCodec> LogicalExtensionCodec for Marked<C> {
@@ -143,23 +156,7 @@ impl<C: LogicalExtensionCodec> LogicalExtensionCodec for Marked<C> {
         self.inner.try_encode_file_format(buffer, node)
     }
 
-    fn try_decode_udf(&self, name: &str, buffer: &[u8]) -> Result<Arc<ScalarUDF>> {
-        self.decoded_scalar(name, buffer)
-    }
-
-    fn try_encode_udf(&self, node: &ScalarUDF, buffer: &mut Vec<u8>) -> Result<()> {
-        self.release.write(scalar(node.name()).is_some(), buffer);
-        Ok(())
-    }
-
-    fn try_decode_udaf(&self, name: &str, buffer: &[u8]) -> Result<Arc<AggregateUDF>> {
-        self.decoded_aggregate(name, buffer)
-    }
-
-    fn try_encode_udaf(&self, node: &AggregateUDF, buffer: &mut Vec<u8>) -> Result<()> {
-        self.release.write(aggregate(node.name()).is_some(), buffer);
-        Ok(())
-    }
+    marked_functions!();
 }
 
 impl<C: PhysicalExtensionCodec> PhysicalExtensionCodec for Marked<C> {
@@ -182,21 +179,5 @@ impl<C: PhysicalExtensionCodec> PhysicalExtensionCodec for Marked<C> {
         self.inner.try_encode(node, buffer, converter)
     }
 
-    fn try_decode_udf(&self, name: &str, buffer: &[u8]) -> Result<Arc<ScalarUDF>> {
-        self.decoded_scalar(name, buffer)
-    }
-
-    fn try_encode_udf(&self, node: &ScalarUDF, buffer: &mut Vec<u8>) -> Result<()> {
-        self.release.write(scalar(node.name()).is_some(), buffer);
-        Ok(())
-    }
-
-    fn try_decode_udaf(&self, name: &str, buffer: &[u8]) -> Result<Arc<AggregateUDF>> {
-        self.decoded_aggregate(name, buffer)
-    }
-
-    fn try_encode_udaf(&self, node: &AggregateUDF, buffer: &mut Vec<u8>) -> Result<()> {
-        self.release.write(aggregate(node.name()).is_some(), buffer);
-        Ok(())
-    }
+    marked_functions!();
 }

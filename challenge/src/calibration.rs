@@ -12,6 +12,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, are_twins};
+use stretch_data::significant;
 use stretch_gap::{Candidate, Diagnosis, Thresholds, VerdictKind};
 
 /// Probability of a truth that is no candidate.
@@ -72,7 +73,7 @@ pub fn calibrated(cases: &[&Case]) -> Thresholds {
     eprintln!("mean ln P(truth): {most:.4} calibrated");
     for threshold in CALIBRATED {
         let value = threshold(&mut best);
-        *value = rounded(*value);
+        *value = significant(*value, 3);
     }
     best
 }
@@ -97,22 +98,4 @@ fn truth(label: &Label, diagnosis: &Diagnosis) -> Vec<usize> {
         _ => c.effects.iter().collect::<BTreeSet<_>>() == named,
     };
     (0..diagnosis.candidates.len()).filter(|&i| is_true(&diagnosis.candidates[i])).collect()
-}
-
-/// To three digits.
-fn rounded(x: f64) -> f64 {
-    let unit = 10.0_f64.powi(x.abs().max(1e-9).log10().floor() as i32 - 2);
-    (x / unit).round() * unit
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn three_digits_stay() {
-        for (x, expected) in [(0.123_456, 0.123), (145.67, 146.0), (5.0, 5.0), (0.001_999, 0.002)] {
-            assert!((rounded(x) - expected).abs() < 1e-9, "{x}");
-        }
-    }
 }

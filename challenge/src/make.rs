@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use stretch_blind::{FormFamily, OpenScore, Plan, PlantName, Truth, make, make_set, sealed_beside};
 use stretch_data::files::{write_folder, write_whole};
 
-use crate::text::Progress;
+use crate::text::progress;
 
 /// Makes the cases of a plan in an empty folder, completely or not at all, so that a person who
 /// opened a seal cannot get another one under its name.
@@ -17,9 +17,9 @@ use crate::text::Progress;
 pub fn make_cases(folder: &Path, seed: u64, plan: &Plan) -> anyhow::Result<String> {
     let cases = plan.cases();
     ensure!(cases > 0, "--cases 0: there is nothing to make");
-    let progress = Progress::new("making cases", cases);
+    let progress = progress("making cases", cases);
     write_folder(folder, false, |draft| {
-        make(draft, seed, plan, &|_| progress.step())?;
+        make(draft, seed, plan, &|_| progress.inc(1))?;
         anyhow::Ok(())
     })?;
     Ok(Truth::open(folder)?.1)

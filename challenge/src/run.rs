@@ -14,14 +14,14 @@ use std::{
 
 use anyhow::{Context, ensure};
 use stretch_data::files::{clean_up_and_exit, write_whole};
-use stretch_gap::{Diagnosis, Evidence, Options, diagnose};
+use stretch_gap::{Diagnosis, Evidence, Options, diagnose, threads};
 use stretch_problem::{Problem, Reading, RigSimulator};
 use stretch_sim::Catalogue;
 use tempfile::TempDir;
 
 use crate::{
     score::{ANSWER, case_folders},
-    text::Progress,
+    text::progress,
 };
 
 /// Why there is no answer.
@@ -83,13 +83,13 @@ pub fn run_cases(folder: &Path, options: &RunOptions) -> anyhow::Result<(usize, 
     let all = case_folders(folder)?;
     let waiting: Vec<&(String, PathBuf)> =
         all.iter().filter(|(_, path)| options.again || !path.join(ANSWER).is_file()).collect();
-    let progress = Progress::new("diagnosing", waiting.len());
-    let jobs = options.jobs.unwrap_or_else(cores);
+    let progress = progress("diagnosing", waiting.len());
+    let jobs = options.jobs.unwrap_or_else(|| threads(0));
     shared_out(jobs, waiting.len(), |at| {
         let (name, path) = waiting[at];
         ensure!(!is_stopped(), "interrupted");
         answer(&program, path, jobs == 1, options).with_context(|| name.clone())?;
-        progress.step();
+        progress.inc(1);
         Ok(())
     })?;
     RUNNING.store(false, SeqCst);
@@ -233,11 +233,6 @@ pub fn shared_out<T: Send>(
     });
     done.sort_by_key(|(at, _)| *at);
     done.into_iter().map(|(_, result)| result).collect()
-}
-
-/// As many as the machine has cores.
-pub(crate) fn cores() -> usize {
-    thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// What a diagnosis is asked.

@@ -9,13 +9,13 @@ use std::{
 use anyhow::{Context, ensure};
 use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Score, Truth, Verdict};
 use stretch_data::files::Outputs;
-use stretch_gap::Options;
+use stretch_gap::{Options, threads};
 
 use crate::{
     goals::{Goal, goals},
     page::page,
-    run::{cores, diagnosed, shared_out},
-    text::Progress,
+    run::{diagnosed, shared_out},
+    text::progress,
 };
 
 /// The answer in a case's folder.
@@ -117,11 +117,11 @@ fn oracle(folder: &Path, answers: &mut Answers) -> anyhow::Result<()> {
     let verdicts = answers.verdicts.iter().enumerate();
     let wanted: Vec<(usize, &Label)> =
         verdicts.filter_map(|(i, v)| Some((i, label(&v.case)?))).collect();
-    let progress = Progress::new("fits that know the label", wanted.len());
-    let found = shared_out(cores(), wanted.len(), |at| {
+    let progress = progress("fits that know the label", wanted.len());
+    let found = shared_out(threads(0), wanted.len(), |at| {
         let (i, label) = wanted[at];
         let closed = closed_by(&folder.join(&answers.verdicts[i].case), &label.effects);
-        progress.step();
+        progress.inc(1);
         Ok((i, closed))
     })?;
     for (i, closed) in found {

@@ -2,37 +2,22 @@
 
 use std::{
     fmt::Display,
-    io::{IsTerminal, Write, stderr, stdout},
-    sync::atomic::{AtomicUsize, Ordering::Relaxed},
+    io::{Write, stdout},
 };
+
+use indicatif::{ProgressBar, ProgressStyle};
 
 /// Writes a text and a newline to standard output; the work continues if standard output is closed.
 pub fn say(text: impl Display) {
     let _ = writeln!(stdout(), "{text}");
 }
 
-/// Progress: how many of a number of steps are done, only on a terminal.
-#[derive(Debug)]
-pub struct Progress {
-    what: &'static str,
-    steps: usize,
-    done: AtomicUsize,
-}
-
-impl Progress {
-    /// Nothing is done yet of so many steps.
-    pub fn new(what: &'static str, steps: usize) -> Self {
-        Self { what, steps, done: AtomicUsize::new(0) }
-    }
-
-    /// One more step is done.
-    pub fn step(&self) {
-        let done = self.done.fetch_add(1, Relaxed) + 1;
-        if stderr().is_terminal() {
-            let end = if done == self.steps { "\n" } else { "" };
-            let _ = write!(stderr(), "\r{}: {done} of {}{end}", self.what, self.steps);
-        }
-    }
+/// A bar on standard error, only on a terminal.
+pub fn progress(what: &'static str, steps: usize) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg}: {pos} of {len}");
+    let bar = ProgressBar::new(steps as u64).with_message(what);
+    // the template is a constant
+    bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
 /// A text whose Markdown tables have columns of one width each.

@@ -10,9 +10,9 @@ use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::ValueEnum;
 use serde::Deserialize;
 use stretch_calibrate::{
-    CalibrateError, Calibrated, Candidate, Evaluation, MODELS_IN_WORDS, Memory, ModelChoice,
+    CalibrateError, Calibrated, Candidate, Evaluation, Memory, ModelChoice,
     ModelKind, Options, Robust, SpellingError, calibrate, choose_model_watched, copied_signals,
-    evaluate, evaluate_errors, explains_little, explains_nothing, parse_rate, rank_signals,
+    evaluate_errors, explains_little, explains_nothing, parse_rate, rank_signals,
     without_gross_errors,
 };
 use stretch_core::RateEstimator;
@@ -21,7 +21,7 @@ use stretch_data::{Split, Trial};
 use stretch_gap::Diagnosis;
 use stretch_problem::{Causes, causes, name_of};
 use stretch_recording::{ReadOptions, RecordingError, tidy_column};
-use stretch_report::{Context, Judged, calibration_page, calibration_verdict};
+use stretch_report::{Context, Judged, calibration_report, calibration_verdict};
 use stretch_sleeve::{calibrate_gauge, missing_turns};
 
 use super::{
@@ -573,7 +573,8 @@ fn judge(
     };
     // The line is the baseline with which every surface is compared.
     let linear = straight_line(trials, options).map_err(|error| of_files(error, &args.trials))?;
-    let (page, evaluation) = report(trials, test, [&linear, calibrated], chosen, options)?;
+    let both = [&linear, calibrated];
+    let (page, evaluation) = calibration_report(both, [trials, test], chosen, options)?;
     stage_text(outputs, path, &page)?;
     Ok(verdict(calibrated, trials, Ok(evaluation), options))
 }
@@ -617,42 +618,6 @@ pub(super) fn other_columns(trials: &[Trial], but: &[String]) -> anyhow::Result<
         but.join(", ")
     );
     Ok(names)
-}
-
-/// Returns the report, and the errors of the raw signal and of the calibration.
-fn report(
-    trials: &[Trial],
-    test: &[Trial],
-    [linear, calibrated]: [&Calibrated; 2],
-    (ranking, choice): (&[Candidate], Option<&ModelChoice>),
-    options: &Options,
-) -> anyhow::Result<(String, Evaluation)> {
-    let judged = if test.is_empty() { trials } else { test };
-    let name = options.model.to_string();
-    let mut shown = vec![("linear", linear)];
-    if options.model != ModelKind::Linear {
-        shown.push((name.as_str(), calibrated));
-    }
-    let named: Vec<_> = shown.iter().map(|(name, c)| (*name, &c.calibration)).collect();
-    let mut evaluation = evaluate(&named, judged)?;
-    let names = |trials: &[Trial]| trials.iter().map(|trial| trial.name.clone()).collect();
-    let context = Context {
-        title: format!("Calibration of {} on {}", options.reference, options.signal),
-        calibrated_on: names(trials),
-        tested_on: names(test),
-        signal_choice: ranking.to_vec(),
-        notes: choice
-            .map(|choice| format!("{}; {MODELS_IN_WORDS}", choice.why))
-            .into_iter()
-            .chain(calibrated.notes.clone())
-            .collect(),
-        kinds: Vec::new(),
-    };
-    let judged = Judged { calibrated: &shown, evaluation: &evaluation, context: &context };
-    let page = calibration_page(&judged);
-    let own = evaluation.pooled.len() - 1;
-    evaluation.pooled.drain(1..own);
-    Ok((page, evaluation))
 }
 
 #[cfg(test)]

@@ -1,7 +1,10 @@
 //! The report of a calibration: its errors and its parts.
 
-use stretch_calibrate::{Calibrated, Candidate, Evaluation, MethodErrors, ModelKind, TrialErrors};
-use stretch_data::listed;
+use stretch_calibrate::{
+    CalibrateError, Calibrated, Candidate, Evaluation, MODELS_IN_WORDS, MethodErrors, ModelChoice,
+    ModelKind, Options, TrialErrors, evaluate,
+};
+use stretch_data::{Trial, listed};
 use stretch_problem::in_words;
 
 use super::{
@@ -53,6 +56,66 @@ pub struct Judged<'a> {
     pub evaluation: &'a Evaluation,
     /// Names and sentences, in addition to the numbers.
     pub context: &'a Context,
+}
+
+/// The report of a calibration next to a straight line, the baseline of every surface; and the errors of the raw signal and of
+/// the calibration. They are judged on the test trials, or on the fitted trials if there are none.
+///
+/// # Errors
+/// As [`evaluate`].
+///
+/// ```
+/// use stretch_calibrate::{Options, calibrate};
+/// use stretch_data::{Channel, Trial};
+///
+/// let angle: Vec<f64> = (0..2000).map(|i| 45.0 - 45.0 * (0.015 * f64::from(i)).cos()).collect();
+/// let volts = angle.iter().zip(0..).map(|(a, i)| 0.01 * a + 1e-3 * (0.7 * f64::from(i)).sin()).collect();
+/// let channel = |name: &str, values| Channel { name: name.to_owned(), values };
+/// let trial = Trial {
+///     name: "knee".into(),
+///     time_s: (0..2000).map(|i| 0.01 * f64::from(i)).collect(),
+///     channels: vec![channel("bridge_v", volts), channel("angle_deg", angle)],
+/// };
+/// let options = Options { reference: "angle_deg".into(), model: "linear".parse()?, ..Options::default() };
+/// let line = calibrate(&[trial.clone()], &options)?;
+/// let (page, evaluation) =
+///     stretch_report::calibration_report([&line, &line], [&[trial], &[]], (&[], None), &options)?;
+/// assert!(page.contains("Calibration of angle_deg on bridge_v"));
+/// assert_eq!(evaluation.pooled.len(), 2);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn calibration_report(
+    [linear, calibrated]: [&Calibrated; 2],
+    [trials, test]: [&[Trial]; 2],
+    (ranking, choice): (&[Candidate], Option<&ModelChoice>),
+    options: &Options,
+) -> Result<(String, Evaluation), CalibrateError> {
+    let judged = if test.is_empty() { trials } else { test };
+    let name = options.model.to_string();
+    let mut shown = vec![("linear", linear)];
+    if options.model != ModelKind::Linear {
+        shown.push((name.as_str(), calibrated));
+    }
+    let named: Vec<_> = shown.iter().map(|(name, c)| (*name, &c.calibration)).collect();
+    let mut evaluation = evaluate(&named, judged)?;
+    let names = |trials: &[Trial]| trials.iter().map(|trial| trial.name.clone()).collect();
+    let context = Context {
+        title: format!("Calibration of {} on {}", options.reference, options.signal),
+        calibrated_on: names(trials),
+        tested_on: names(test),
+        signal_choice: ranking.to_vec(),
+        notes: choice
+            .map(|choice| format!("{}; {MODELS_IN_WORDS}", choice.why))
+            .into_iter()
+            .chain(calibrated.notes.clone())
+            .collect(),
+        kinds: Vec::new(),
+    };
+    let judged = Judged { calibrated: &shown, evaluation: &evaluation, context: &context };
+    let page = calibration_page(&judged);
+    let own = evaluation.pooled.len() - 1;
+    evaluation.pooled.drain(1..own);
+    Ok((page, evaluation))
 }
 
 /// The report as one HTML file.

@@ -2,14 +2,14 @@
 
 use serde::{Deserialize, Serialize};
 use stretch_calibrate::{
-    CalibrateError, Calibrated, Cause, Evaluation, Judged, ModelChoice, ModelKind, ModelRow,
-    Options, calibrate, candidate_models, choose_among, evaluate, evaluation_doubts,
-    explains_little, explains_nothing, judge_model, parse_adc, without_gross_errors,
+    CalibrateError, Calibrated, Cause, Judged, ModelChoice, ModelKind, ModelRow, Options,
+    calibrate, candidate_models, choose_among, evaluate, evaluation_doubts, explains_little,
+    explains_nothing, judge_model, parse_adc, without_gross_errors,
 };
 use stretch_data::{Split, Trial};
 use stretch_export::gauge_header;
 use stretch_problem::Causes;
-use stretch_report::{Context, calibration_page, calibration_verdict};
+use stretch_report::{Context, calibration_report, calibration_verdict};
 use stretch_sleeve::{GaugeCalibration, calibrate_gauge};
 
 use crate::{
@@ -99,8 +99,6 @@ pub(crate) struct Made {
 /// Errors of a calibration, and whether they were measured on trials that were not fitted.
 #[derive(Debug, Serialize)]
 pub(crate) struct Judgement {
-    #[serde(skip)]
-    evaluation: Evaluation,
     #[serde(flatten)]
     errors: Errors,
     held_out: bool,
@@ -187,14 +185,15 @@ impl Made {
             // The sentence is about the calibration, even if the line has smaller errors.
             let all = evaluation.pooled.clone();
             evaluation.pooled.drain(1..all.len() - 1);
+            let calibrated_on = self.trials.iter().map(|trial| trial.name.clone()).collect();
             let sentence = calibration_verdict(&stretch_report::Judged {
                 calibrated: &[(&name, &self.calibrated)],
                 evaluation: &evaluation,
-                context: &self.context(Vec::new()),
+                context: &Context { calibrated_on, ..Context::default() },
             });
             evaluation.pooled = all;
             let errors = Errors::of(sentence, &evaluation, &doubts);
-            self.judged = Some((linear, Judgement { evaluation, errors, held_out }));
+            self.judged = Some((linear, Judgement { errors, held_out }));
         }
         match &self.judged {
             Some((_, judgement)) => Ok(judgement),
@@ -202,30 +201,12 @@ impl Made {
         }
     }
 
-    fn context(&self, test: Vec<Trial>) -> Context {
-        let (reference, signal) = (&self.options.reference, &self.options.signal);
-        Context {
-            title: format!("Calibration of {reference} on {signal}"),
-            calibrated_on: self.trials.iter().map(|trial| trial.name.clone()).collect(),
-            tested_on: test.into_iter().map(|trial| trial.name).collect(),
-            notes: self.calibrated.notes.clone(),
-            ..Context::default()
-        }
-    }
-
     pub(crate) fn report(&mut self, files: &Files) -> Result<String, Said> {
         self.judged(files)?;
-        let Some((linear, Judgement { evaluation, .. })) = &self.judged else {
-            return Ok(String::new());
-        };
-        let name = self.options.model.to_string();
-        let mut shown = vec![("linear", linear)];
-        if self.options.model != ModelKind::Linear {
-            shown.push((name.as_str(), &self.calibrated));
-        }
-        let context = self.context(files.trials(Split::Test)?);
-        let judged = stretch_report::Judged { calibrated: &shown, evaluation, context: &context };
-        Ok(calibration_page(&judged))
+        let Some((linear, _)) = &self.judged else { return Ok(String::new()) };
+        let trials = [&self.trials[..], &files.trials(Split::Test)?];
+        let chosen = (&[][..], self.choice.as_ref());
+        Ok(calibration_report([linear, &self.calibrated], trials, chosen, &self.options)?.0)
     }
 }
 

@@ -56,7 +56,7 @@ const OPTIONS: [(&str, &str); 21] = [
     ("--paper", "write stretch calibrate --rate paper, or stretch demo --paper"),
     ("--rate-source", "--rate paper selects the complete published method"),
     ("--sessions", "write --data FOLDER/GROUP"),
-    ("--threads", "set RAYON_NUM_THREADS=N in the environment; the result is the same"),
+    ("--threads", "set RAYON_NUM_THREADS=N in the environment; the result is the same for every N"),
     ("--time-unit", "write --time COL:UNIT, such as --time stamp:us"),
 ];
 

@@ -179,7 +179,7 @@ fn several_gauges_are_evaluated_together_and_each_alone() {
         as_before < 3.0 && together > as_before && shifted > together,
         "{as_before} {together} {shifted}"
     );
-    assert!(told.contains("was a gauge put on again?"), "{told}");
+    assert!(told.contains("if a gauge was put on again"), "{told}");
     assert!(told.contains("s1 alone by ") && !told.contains("s2 alone by"), "{told}");
     // Two gauges disagree, and their signals do not show which of them has moved.
     assert!(

@@ -10,10 +10,9 @@ use anyhow::{Context as _, anyhow, bail, ensure};
 use clap::ValueEnum;
 use serde::Deserialize;
 use stretch_calibrate::{
-    CalibrateError, Calibrated, Candidate, Evaluation, Memory, ModelChoice,
-    ModelKind, Options, Robust, SpellingError, calibrate, choose_model_watched, copied_signals,
-    evaluate_errors, explains_little, explains_nothing, parse_rate, rank_signals,
-    without_gross_errors,
+    CalibrateError, Calibrated, Candidate, Evaluation, Memory, ModelChoice, ModelKind, Options,
+    Robust, SpellingError, calibrate, choose_model_watched, copied_signals, evaluate_errors,
+    explains_little, explains_nothing, parse_rate, rank_signals, without_gross_errors,
 };
 use stretch_core::RateEstimator;
 use stretch_data::files::{Outputs, read_whole};

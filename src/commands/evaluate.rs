@@ -142,7 +142,7 @@ fn array_doubts(
     let shifted: Vec<String> = shifted.collect();
     if !shifted.is_empty() {
         let text = format!(
-            "was a gauge put on again? On average, these estimates differ from the reference: {}; calibrate again",
+            "on average, the estimates of single gauges differ from the reference ({}); if a gauge was put on again, calibrate again",
             shifted.join(", ")
         );
         // The gauges that have shifted explain the shift of all together.

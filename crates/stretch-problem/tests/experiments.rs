@@ -1,4 +1,5 @@
-//! Candidate experiments: some distinguish effects that motion alone does not.
+//! Tests of the candidate experiments: some of them distinguish effects that recordings of motion
+//! alone cannot distinguish.
 
 use stretch_data::SessionTrial;
 use stretch_gap::{Laboratory, Model, Simulator, differences};

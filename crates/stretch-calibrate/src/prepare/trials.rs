@@ -290,7 +290,8 @@ pub fn even_signals(trials: &[Trial], options: &Options) -> Result<Vec<Vec<f64>>
     Ok(evened.pieces.into_iter().map(|(_, [signal, ..])| signal).collect())
 }
 
-/// Errors of estimates in normalised target, accumulated sample by sample.
+/// Sums over samples of the normalised target and of its estimation errors, from which R^2 and the
+/// root mean square error are computed.
 #[derive(Default)]
 pub(crate) struct Tally {
     squares: f64,

@@ -1,9 +1,10 @@
 //! A simulator whose recording or rig file may be wrong.
 //!
 //! An error is treated as an effect, so that it is fitted together with the nominal parameters. The
-//! recorded values do not change. Instead, the simulated output is distorted in the same way as the
-//! recorded column, and a stage that the column drives is run on the corrected column. Every
-//! hypothesis is therefore compared with the same measurements.
+//! recorded values do not change. Instead, the supposed error of a column is applied to the
+//! simulated output that is compared with it. A stage that has the column as an input is run on a
+//! copy of the column from which the error is removed. Every hypothesis is therefore compared with
+//! the same measurements.
 
 use std::{collections::VecDeque, sync::Mutex};
 

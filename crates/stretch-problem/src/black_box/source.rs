@@ -160,7 +160,7 @@ pub enum SourceError {
     #[error(
         "stage {stage}: the simulator answers {}, {first} and then {second} in row {row} of {trial}; {}",
         question(.over),
-        if over[0] == over[1] { "seed its random numbers, and begin every run from the same state" } else { "let no sample depend on later ones" }
+        if over[0] == over[1] { "seed its random numbers, and begin every run from the same state" } else { "compute each sample from this and earlier samples only, so that a run over more trials begins with the samples of a run over fewer" }
     )]
     Changed {
         /// The stage.

@@ -93,7 +93,7 @@ pub struct Worn {
 ///
 /// Source: this project. The filter is that of Kalman 1960, doi:10.1115/1.3662552, except that it linearises with a
 /// secant instead of the tangent: the secant to the drive at which `curve` has the measured signal.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct DiagnosedMap {

@@ -52,18 +52,8 @@ fn diagnosed() -> Result<Calibration, DesignError> {
         return Err(observer.spec().model.instead_of("observer"));
     };
     let map = DiagnosedMap {
-        rest: None,
-        slack_low: None,
-        slack_high: None,
         slip: Some(Plays { share: 1.0, radii: [0.007, 0.01, 0.013] }),
-        crosstalk: None,
-        hysteresis: None,
         relaxation: Some(Fading { share: 0.2, taus_s: [0.15, 0.25, 0.4] }),
-        worn: None,
-        floor: None,
-        ceiling: None,
-        lowpass_s: None,
-        skew_s: 0.0,
         initial_hysteresis: [-1.0, 1.0],
         curve: map.curve,
         drive_domain: map.drive_domain,
@@ -73,6 +63,7 @@ fn diagnosed() -> Result<Calibration, DesignError> {
         spread: 1.0,
         estimate_domain: map.estimate_domain,
         fit: map.fit,
+        ..DiagnosedMap::default()
     };
     Calibration::new(CalibrationSpec { model: Model::Diagnosed(map), ..observer.into_spec() })
 }

@@ -1,7 +1,7 @@
 //! Parameters of named defects: initial values and ranges for a fit, and the model (`DiagnosedMap`) that the parameters
 //! give.
 
-use stretch_core::{DiagnosedMap, FitSummary, Interval, Target as Polarity, Values};
+use stretch_core::{DiagnosedMap, Interval, Target as Polarity};
 use stretch_effects::{
     Effect, EffectParameter, Extent, GAUGE, Grid, Live, Need, Place, Target, gauge_effect,
 };
@@ -155,28 +155,15 @@ impl Defects {
     pub(crate) fn map(&self) -> DiagnosedMap {
         let open = Interval { min: 0.0, max: 1.0 };
         let mut map = DiagnosedMap {
-            rest: None,
-            slack_low: None,
-            slack_high: None,
-            slip: None,
-            crosstalk: None,
-            hysteresis: None,
-            relaxation: None,
-            worn: None,
-            floor: None,
-            ceiling: None,
-            lowpass_s: None,
-            skew_s: 0.0,
             // A stream that starts at one end of the range is assumed to have come from the other end.
             initial_hysteresis: [-1.0, 1.0],
-            curve: Values::EMPTY,
             drive_domain: open,
             noise: 1.0,
             agility: 1.0,
             steady_s: 1.0,
             spread: 1.0,
             estimate_domain: open,
-            fit: FitSummary { samples: 0, r_squared: 0.0, rmse: 0.0 },
+            ..DiagnosedMap::default()
         };
         for (_, live, values) in self.values() {
             (live.set)(&values, &self.target, &mut map);

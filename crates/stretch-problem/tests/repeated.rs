@@ -100,7 +100,7 @@ const DOUBTFUL: [Doubtful; 7] = [
             sound(compliance, force).iter().map(|y| y + offset).collect()
         },
         false,
-        &["the same rows differently in runs over", "row 0 of spring.csv; let no sample"],
+        &["the same rows differently in runs over", "row 0 of spring.csv; compute each sample"],
     ),
     (
         1,

@@ -3,8 +3,9 @@
 //!
 //! A significant effect may still be irrelevant: with 50 000 samples, a score of sixty nats may
 //! correspond to a hundred-thousandth of the gap. Therefore the part of the gap that an effect
-//! closes in one of its stages, on fitted or on test trials, must be a relevant gap by itself;
-//! otherwise the effect is reported as faint. Alternatives come from the smallest collection of
+//! closes in one of its stages, on fitted or on test trials, must be a relevant gap by itself, and
+//! the effect must close a part of the gap on trials that were not fitted; otherwise the effect is
+//! reported as faint. Alternatives come from the smallest collection of
 //! sets that holds 95 % of the probability. If one of these sets differs from the most probable set
 //! in a single effect, the two effects in which they differ are a tie.
 
@@ -34,10 +35,12 @@ impl Naming {
         is_short: bool,
     ) -> Self {
         let Some(first) = candidates.first() else { return Self::default() };
-        let size = |name: &str| shares.iter().find(|s| s.effect == name).map(|s| s.closes_excess);
+        let share = |name: &str| shares.iter().find(|s| s.effect == name);
         // If an alternative became the first candidate, no share was computed for its effect. The
         // effect then counts as relevant.
-        let counts = |name: &&String| size(name).is_none_or(|s| s >= thresholds.least_gap);
+        let is_relevant =
+            |s: &EffectShare| s.closes_excess >= thresholds.least_gap && s.closes > 0.0;
+        let counts = |name: &&String| share(name).is_none_or(is_relevant);
         let (mut named, mut faint): (Vec<String>, Vec<String>) =
             first.effects.iter().cloned().partition(|name| counts(&name));
         if named.is_empty() && !faint.is_empty() {
@@ -135,6 +138,9 @@ mod tests {
         );
         assert_eq!(naming.ties, [("slack".into(), "saturation".into())]);
         assert!((naming.probability(&candidates) - 0.96).abs() < 1e-12);
+        // An effect that closes nothing on trials that were not fitted is not named.
+        let fitted = [share("slack", 0.95), EffectShare { closes: -0.01, ..share("sag", 0.4) }];
+        assert_eq!(Naming::of(&candidates, &fitted, &Thresholds::frozen(), false), naming);
         // In a short recording, a set that closes as much is a tie, whatever its probability.
         let short = Naming::of(&candidates, &shares, &Thresholds::frozen(), true);
         assert_eq!(short.ties.len(), 1);

@@ -1,6 +1,6 @@
 //! A user's own problem, checked: recordings on one grid, stages, parameters, effects, and the session for a source.
 
-use std::{ops::Range, sync::Arc};
+use std::{collections::HashSet, ops::Range, sync::Arc};
 
 use stretch_data::{Quantity, ends, unit, unit_of};
 use stretch_effects::{Grid, Kind, Side, Sketch, kind_named};
@@ -270,13 +270,8 @@ fn used(stages: &[StageEntry], spec: &ProblemSpec) -> Vec<String> {
     let all = all.chain(spec.inputs.iter().map(|i| i.column.clone()));
     let all = all.chain(spec.beside.iter().cloned());
     let all = all.chain(spec.reference.clone());
-    let mut out: Vec<String> = Vec::new();
-    for name in all {
-        if !out.contains(&name) {
-            out.push(name);
-        }
-    }
-    out
+    let mut seen = HashSet::new();
+    all.filter(|name| seen.insert(name.clone())).collect()
 }
 
 /// The stage of a sensor, and the column that the sensor measures.

@@ -2,7 +2,7 @@
 
 use stretch_data::{Remarks, RigFile};
 use stretch_gap::Model;
-use stretch_sim::{Effect, EffectSet, Grid, Rig, Surroundings};
+use stretch_sim::{Effect, EffectParameter, EffectSet, Grid, Rig, Surroundings};
 
 use super::{
     RigSimulator,
@@ -28,7 +28,7 @@ impl BuiltIn for RigSimulator {
     }
 
     fn within(effect: &Effect, values: &[f64]) -> Vec<f64> {
-        let allowed = effect.parameters.iter().map(|p| p.allowed());
+        let allowed = effect.parameters.iter().map(EffectParameter::allowed);
         allowed.zip(values).map(|(ends, x)| x.clamp(*ends.start(), *ends.end())).collect()
     }
 

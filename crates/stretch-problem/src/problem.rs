@@ -30,14 +30,7 @@ pub trait Diagnosable: Simulator + Debug + Send {
     }
 
     /// A recorded column by its name, all trials end to end.
-    fn column(&self, name: &str) -> Option<Vec<f64>> {
-        let about = self.description();
-        let stage = about.stages.iter().position(|s| s.channel == name);
-        let record = about.record();
-        let columns = || record.columns.iter().find(|c| c.name == name).map(|c| c.values.to_vec());
-        let signals = || record.signals.iter().find(|s| s.name == name).map(|s| s.values.clone());
-        stage.map(|stage| self.measured(stage).to_vec()).or_else(columns).or_else(signals)
-    }
+    fn column(&self, name: &str) -> Option<Vec<f64>>;
 
     /// The experiment that would distinguish the alternatives of a diagnosis; `None` if no
     /// candidate experiment distinguishes them, or if the simulator cannot predict experiments.

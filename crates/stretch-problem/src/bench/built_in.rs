@@ -82,6 +82,10 @@ impl<B: BuiltIn + Debug + Send> Diagnosable for B {
         BuiltIn::afterwards(self)
     }
 
+    fn column(&self, name: &str) -> Option<Vec<f64>> {
+        self.bench().columns.of(name).map(<[f64]>::to_vec)
+    }
+
     fn next(
         &self,
         diagnosis: &Diagnosis,

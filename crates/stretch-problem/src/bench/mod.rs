@@ -13,7 +13,9 @@ mod specs;
 use std::path::Path;
 
 use stretch_data::RigFile;
-use stretch_gap::{Description, DescriptionSpec, Line, Model, ParameterSpec, StageSpec};
+use stretch_gap::{
+    Description, DescriptionSpec, Line, Model, ParameterSpec, RecordFacts, StageSpec,
+};
 use stretch_sim::{Effect, EffectSet, Measured, SimError};
 
 use crate::error::ProblemError;
@@ -50,6 +52,7 @@ impl Bench {
         effects: EffectSet,
         candidates: impl Iterator<Item = (&'static Effect, Place)>,
         (noise, unit): (f64, f64),
+        facts: impl FnOnce(&Self) -> RecordFacts,
     ) -> Result<Self, ProblemError> {
         let missing = candidates.filter(|(effect, _)| effects.find(effect.name).is_none());
         let (rows, specs) = shown(missing, columns.dt_s, &mut columns.notes);
@@ -57,7 +60,9 @@ impl Bench {
         let (trials, dt_s) = (columns.trials.clone(), columns.dt_s);
         let about = DescriptionSpec { stages, parameters, effects: specs, trials, dt_s };
         let about = Description::new(about)?;
-        Ok(Self { about, columns, effects, rows, sensor, noise, unit })
+        let own = Self { about, columns, effects, rows, sensor, noise, unit };
+        let facts = facts(&own);
+        Ok(Self { about: own.about.with_record(facts)?, ..own })
     }
 
     /// The measured output of a stage, all trials end to end.

@@ -131,9 +131,9 @@ impl GaugeSimulator {
         let candidates = catalogue.iter().filter(|e| Gauge::accepts(e, has_pressure)).map(place);
         let sensor = (y_noise.sd(), greatest - least);
         let GaugeRig { spec, offset, gain, effects } = rig;
-        let mut bench = Bench::new((stages, parameters), columns, effects, candidates, sensor)?;
-        let known = facts(&bench, input.values());
-        bench.about = bench.about.with_record(known)?;
+        let known = |bench: &Bench| facts(bench, input.values());
+        let described = (stages, parameters);
+        let bench = Bench::new(described, columns, effects, candidates, sensor, known)?;
         Ok(Self { bench, spec, tolerances: [offset, gain], input })
     }
 

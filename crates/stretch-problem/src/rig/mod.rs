@@ -108,9 +108,8 @@ impl RigSimulator {
         let (candidates, sensor) = (catalogue.iter().map(place), (noises.volts.sd(), 1.0));
         let Rig { params: base, tolerances, effects } = rig;
         let described = (stages, parameters);
-        let mut bench = Bench::new(described, columns, effects, candidates, sensor)?;
-        let known = facts(&bench, &inputs, (&stage_kinds, &tuned));
-        bench.about = bench.about.with_record(known)?;
+        let known = |bench: &Bench| facts(bench, &inputs, (&stage_kinds, &tuned));
+        let bench = Bench::new(described, columns, effects, candidates, sensor, known)?;
         Ok(Self {
             bench,
             base,

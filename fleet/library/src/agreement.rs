@@ -123,28 +123,15 @@ impl GroupsAccumulator for Agreements {
     }
 }
 
-/// Serializes counts and sums, little-endian. They are passed between the stages of one query, and
-/// never stored.
+/// Counts and sums, as postcard writes them. They are passed between the stages of one query, and never stored.
 fn write(agreement: &Agreement<f64>) -> Vec<u8> {
     let AgreementSpec { count, skipped, errors, truth, estimate, products } = agreement.spec();
-    let numbers = errors.iter().chain(&truth).chain(&estimate).chain(&products);
-    let counts = [count.to_le_bytes(), skipped.to_le_bytes()];
-    counts.into_iter().chain(numbers.map(|x| x.to_le_bytes())).flatten().collect()
+    let numbers = (count, skipped, errors, truth, estimate, products);
+    // Memory takes every number.
+    postcard::to_extend(&numbers, Vec::new()).unwrap_or_default()
 }
 
 fn read(bytes: &[u8]) -> Option<Agreement<f64>> {
-    let (words, []) = bytes.as_chunks::<8>() else { return None };
-    let [count, skipped, numbers @ ..] = words else { return None };
-    let numbers: Vec<f64> = numbers.iter().map(|word| f64::from_le_bytes(*word)).collect();
-    let (errors, rest) = numbers.split_first_chunk()?;
-    let (truth, rest) = rest.split_first_chunk()?;
-    let (estimate, products) = rest.split_first_chunk()?;
-    Agreement::from_spec(AgreementSpec {
-        count: u64::from_le_bytes(*count),
-        skipped: u64::from_le_bytes(*skipped),
-        errors: *errors,
-        truth: *truth,
-        estimate: *estimate,
-        products: products.try_into().ok()?,
-    })
+    let (count, skipped, errors, truth, estimate, products) = postcard::from_bytes(bytes).ok()?;
+    Agreement::from_spec(AgreementSpec { count, skipped, errors, truth, estimate, products })
 }

@@ -6,7 +6,7 @@ use sha2::{Digest, Sha256};
 const SCRIPT: &str = include_str!("report.js");
 
 /// The whole text of the element, which is a CDATA section in XML and a program between comments in HTML.
-fn text() -> String {
+pub(crate) fn text() -> String {
     format!("/*<![CDATA[*/\n{SCRIPT}/*]]>*/")
 }
 

@@ -26,7 +26,7 @@ fn main() -> Outcome<()> {
     fs::create_dir_all(out)?;
     let glue = Glue::of(Path::new(wasm), out)?;
     let template = fs::read_to_string(sources.join("index.html"))?;
-    let (mut html, mut digests) = (String::new(), vec![report_digest()?]);
+    let (mut html, mut digests) = (String::new(), vec![script::digest(&script::text())]);
     for line in template.lines() {
         let words: Vec<&str> = line.split_whitespace().collect();
         match words.as_slice() {
@@ -69,13 +69,6 @@ fn policy(digests: &[String]) -> String {
          base-uri 'none'; form-action 'none'",
         digests.join(" ")
     )
-}
-
-/// The digest that reports name in their own policy.
-fn report_digest() -> Outcome<String> {
-    let policy = script::policy();
-    let found = policy.split([' ', ';']).find(|word| word.starts_with("'sha256-"));
-    Ok(found.ok_or("the reports' policy names no digest")?.to_owned())
 }
 
 /// The module, and the JavaScript that wasm-bindgen generates for it.

@@ -12,9 +12,12 @@ use std::{
 };
 
 use numpy::PyArray1;
-use pyo3::{prelude::*, types::PyDict};
+use pyo3::{
+    prelude::*,
+    types::{IntoPyDict, PyDict},
+};
 use serde::Deserialize;
-use stretch_data::{Channel, SessionTrial, Split, Trial};
+use stretch_data::{SessionTrial, Split, Trial};
 use stretch_gap::Options;
 use stretch_problem::{
     BlackBox, Checked, Examined, Fixed, KINDS, Kind, Language, PAUSE_S, Prediction, Problem,
@@ -25,7 +28,7 @@ use stretch_report::{Subject, diagnosis_page};
 
 use crate::{
     error::said,
-    recording::Recording,
+    recording::{Recording, columns},
     source::{Asked, Message, serve},
 };
 
@@ -140,11 +143,8 @@ impl Entries {
     /// Columns on the grid, all trials end to end.
     #[getter]
     fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let columns = PyDict::new(py);
-        for column in &self.checked.session().columns {
-            columns.set_item(&column.name, PyArray1::from_slice(py, &column.values))?;
-        }
-        Ok(columns)
+        let columns = self.checked.session().columns.iter();
+        columns.map(|c| (&c.name, PyArray1::from_slice(py, &c.values))).into_py_dict(py)
     }
 
     /// Diagnoses the problem. Returns the diagnosis as JSON, its report, the measured and the simulated curves of each
@@ -161,22 +161,12 @@ impl Entries {
         let job = move |work: &Work<Answer>| work.answered(checked, trials);
         let done = self.worked(py, simulator, how, progress, job)?;
         let Answer { json, page, curves, code, experiment, fixed } = done;
-        let shown = PyDict::new(py);
-        for (output, all) in curves {
-            shown.set_item(output, all.map(|curve| PyArray1::from_vec(py, curve)))?;
-        }
-        let functions = PyDict::new(py);
-        code.into_iter().try_for_each(|(effect, text)| functions.set_item(effect, text))?;
-        let columns = |trial: Trial| -> PyResult<Bound<'py, PyDict>> {
-            let columns = PyDict::new(py);
-            columns.set_item("time_s", PyArray1::from_vec(py, trial.time_s))?;
-            for Channel { name, values } in trial.channels {
-                columns.set_item(name, PyArray1::from_vec(py, values))?;
-            }
-            Ok(columns)
-        };
+        let arrays = |all: [Vec<f64>; 4]| all.map(|curve| PyArray1::from_vec(py, curve));
+        let shown = curves.into_iter().map(|(output, all)| (output, arrays(all)));
+        let columns = |trial: Trial| columns(py, trial.time_s, trial.channels).into_py_dict(py);
+        let experiment = experiment.map(columns).transpose()?;
         let fixed = fixed.map(|spec| FixedEntries { spec, file: self.file.clone() });
-        Ok((json, page, shown, functions, experiment.map(columns).transpose()?, fixed))
+        Ok((json, page, shown.into_py_dict(py)?, code.into_py_dict(py)?, experiment, fixed))
     }
 
     /// Predicts the recordings from index `fitted` on, with and without the effects of the problem. Returns the

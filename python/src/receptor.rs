@@ -1,7 +1,10 @@
 //! A calibration that runs live.
 
-use pyo3::{prelude::*, types::PyDict};
-use stretch_calibrate::LiveReceptor;
+use pyo3::{
+    prelude::*,
+    types::{IntoPyDict, PyDict},
+};
+use stretch_calibrate::{Faults, LiveReceptor};
 use stretch_core::Target;
 
 /// Estimate for one sample, as returned by `Receptor.step`.
@@ -110,11 +113,7 @@ impl Receptor {
     /// sample interval, and `backwards` time stamps that were repeated or ran backwards.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let faults = self.live.faults();
-        let dict = PyDict::new(py);
-        dict.set_item("missing", faults.missing)?;
-        dict.set_item("jittered", faults.jittered)?;
-        dict.set_item("backwards", faults.backwards)?;
-        Ok(dict)
+        let Faults { missing, jittered, backwards } = self.live.faults();
+        [("missing", missing), ("jittered", jittered), ("backwards", backwards)].into_py_dict(py)
     }
 }

@@ -73,11 +73,12 @@ impl Asked {
 }
 
 /// Columns by name, including the time.
-type Columns<'py> = Vec<(String, Bound<'py, PyArray1<f64>>)>;
+pub(crate) type Columns<'py> = Vec<(String, Bound<'py, PyArray1<f64>>)>;
 /// The columns of each clock, by its name.
 type Clocks<'py> = Vec<(String, Columns<'py>)>;
 
-fn columns(py: Python<'_>, time_s: Vec<f64>, channels: Vec<Channel>) -> Columns<'_> {
+/// Converts a time and channels to arrays.
+pub(crate) fn columns(py: Python<'_>, time_s: Vec<f64>, channels: Vec<Channel>) -> Columns<'_> {
     let time = ("time_s".to_owned(), PyArray1::from_vec(py, time_s));
     let channels = channels.into_iter().map(|c| (c.name, PyArray1::from_vec(py, c.values)));
     std::iter::once(time).chain(channels).collect()

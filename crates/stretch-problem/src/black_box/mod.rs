@@ -9,6 +9,7 @@ mod facts;
 mod fixed;
 mod inner_run;
 mod linear;
+mod repeated;
 mod runs;
 pub(crate) mod source;
 pub(crate) mod spec;

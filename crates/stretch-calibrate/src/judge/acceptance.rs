@@ -164,8 +164,9 @@ pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<Doubt> {
 }
 
 /// Returns a doubt that lists the trials to which a calibration was fitted; `None` if there are none. `columns` are
-/// the signals and the reference. A calibration holds the names of its first trials and the checksums of their samples. A trial is therefore recognised under
-/// another name, and a trial that has only the name of a fitted trial is reported as such.
+/// the signals and the reference. A calibration holds the names of its first trials and the checksums of their samples.
+/// A trial is therefore recognised under another name, and a trial that has only the name of a fitted trial is reported
+/// as such.
 pub fn fitted_trials(provenance: &Provenance, columns: &[&str], trials: &[Trial]) -> Option<Doubt> {
     let is_known = |trial: &Trial| {
         let checksum = trial.checksum(columns);

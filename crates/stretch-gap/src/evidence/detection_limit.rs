@@ -21,9 +21,9 @@
 //! as [one observation](crate::fit::score). The effect is *seen* at the amplitude a if an amplitude
 //! of a - 1.28 sd, which nine of ten recordings exceed, meets the criteria for adding an effect to
 //! the nominal simulator. It is *named* if its likelihood is also larger than that of the most
-//! similar other effect in nine of ten recordings (Cox 1961). If c is the correlation of the changes by the
-//! two effects, the difference of the log-likelihoods has the mean W a^2 (1 - c^2)/2 and the
-//! variance W a^2 (1 - c^2), so that this requires
+//! similar other effect in nine of ten recordings (Cox 1961). If c is the correlation of the
+//! changes by the two effects, the difference of the log-likelihoods has the mean
+//! W a^2 (1 - c^2)/2 and the variance W a^2 (1 - c^2), so that this requires
 //!
 //! ```text
 //! W a^2 (1 - c^2) > (2 * 1.28)^2
@@ -40,14 +40,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    fit::{
-        hypothesis::Hypothesis, octaves::Octaves, prepared::PreparedProblem,
-        score::samples_per_observation,
-    },
-    problem::{
-        error::GapError, sample_roles::Role, simulator::Model, spec::EffectSpec,
-        thresholds::Thresholds,
-    },
+    fit::{hypothesis::Hypothesis, octaves::Octaves, prepared::PreparedProblem},
+    problem::{error::GapError, sample_roles::Role, spec::EffectSpec, thresholds::Thresholds},
     search::{
         acceptance::Acceptance,
         screen::{Ground, Projected},
@@ -138,6 +132,8 @@ struct Change {
     /// <d,d>.
     square: f64,
     octaves: Octaves,
+    /// x of the module documentation.
+    level: f64,
     /// The product m x of the module documentation.
     weight: f64,
 }
@@ -159,15 +155,15 @@ pub(crate) fn detection_limits(
 ) -> Result<Vec<DetectionLimit>, GapError> {
     let problem = inputs.problem;
     let effects = problem.simulator().effects();
-    let around = match looked {
-        Some(_) => None,
-        None => Some(Ground::around(&problem.compare, problem.nominal.model.clone())?),
+    let around;
+    let ground = match looked {
+        Some(looked) => &looked.ground,
+        None => {
+            around = Ground::around(&problem.compare, problem.nominal.model.clone())?;
+            &around
+        }
     };
-    let Some(ground) = looked.map(|looked| &looked.ground).or(around.as_ref()) else {
-        return Ok(Vec::new());
-    };
-    let noise = noise(inputs)?;
-    let limits = Prober { inputs, ground, noise };
+    let prober = Prober { inputs, ground, noise: noise(inputs)? };
     let first = effects.par_iter().enumerate().map(|(e, spec)| {
         let known = looked.and_then(|looked| looked.screened.iter().find(|s| s.effect == e));
         let sizes = match known {
@@ -178,7 +174,7 @@ pub(crate) fn detection_limits(
             }
         };
         let starts = moved_starts(inputs, spec, &sizes).into_iter();
-        starts.filter_map(|(values, power)| limits.probe(e, &values, power).transpose()).collect()
+        starts.filter_map(|(values, power)| prober.probe(e, &values, power).transpose()).collect()
     });
     // By effect; the first probe of an effect is the one that its own limit is computed from.
     let mut probes = first.collect::<Result<Vec<Vec<Probe>>, GapError>>()?;
@@ -186,12 +182,12 @@ pub(crate) fn detection_limits(
     let rounds = if problem.simulator().model_runs().is_none() { ROUNDS } else { 0 };
     for _ in 0..rounds {
         let moved: Vec<(usize, f64)> = (0..effects.len())
-            .filter_map(|e| Some((e, limits.moved(&probes, e, probes[e].first()?)?)))
+            .filter_map(|e| Some((e, prober.moved(&probes, e, probes[e].first()?)?)))
             .collect();
         if moved.is_empty() {
             break;
         }
-        let again = moved.into_par_iter().map(|(e, to)| Ok((e, limits.again(&probes, e, to)?)));
+        let again = moved.into_par_iter().map(|(e, to)| Ok((e, prober.again(&probes, e, to)?)));
         for (e, probe) in again.collect::<Result<Vec<_>, GapError>>()? {
             if let Some(probe) = probe {
                 probes[e][0] = probe;
@@ -199,16 +195,14 @@ pub(crate) fn detection_limits(
         }
     }
     let shown = effects.iter().enumerate().filter(|(_, spec)| !spec.is_found);
-    Ok(shown.map(|(e, spec)| limits.shown(&probes, e, spec)).collect())
+    Ok(shown.map(|(e, spec)| prober.shown(&probes, e, spec)).collect())
 }
 
 /// Returns the residual of the best set by stage, without its nuisances.
 fn noise(inputs: LimitInputs<'_>) -> Result<Vec<Vec<f64>>, GapError> {
     let compare = &inputs.problem.compare;
     let one = |stage: usize| {
-        let mut clean = compare.residual_values(stage, &inputs.best.model)?;
-        compare.metrics[stage].clean(&compare.roles, &mut clean);
-        Ok(clean)
+        Ok(compare.clean(stage, &compare.residual_values(stage, &inputs.best.model)?))
     };
     (0..compare.metrics.len()).into_par_iter().map(one).collect()
 }
@@ -310,8 +304,7 @@ impl Prober<'_> {
         let Some((main, distance)) = main_of(spec, values) else { return Ok(None) };
         let model = self.ground.model.with(effect, values);
         let price = problem.price(&model);
-        let models: [Model; 1] = [model];
-        let Some(there) = compare.possible_residuals(&spec.touches, &models)?.remove(0) else {
+        let Some(there) = compare.possible_residuals(&spec.touches, &[model])?.remove(0) else {
             return Ok(None);
         };
         let parameter = &spec.parameters[main];
@@ -331,11 +324,9 @@ impl Prober<'_> {
         let noise = &self.noise[stage];
         let both: Vec<f64> =
             projected.column.values.iter().zip(noise).map(|(d, r)| d + r).collect();
-        let parts = compare.roles.of_role(Role::Fit).map(|s| &both[s.from..s.to]);
-        let memory = samples_per_observation(&parts.collect::<Vec<_>>(), compare.roles.block);
         let level = compare.mean_square(&self.inputs.best.misfits[stage]).max(f64::MIN_POSITIVE);
         let square = compare.inner(stage, &projected, &projected);
-        Change { stage, square, projected, octaves, weight: memory * level }
+        Change { stage, square, projected, octaves, level, weight: compare.memory(&both) * level }
     }
 
     /// Whether an effect is seen at an amplitude of its probe.
@@ -352,10 +343,9 @@ impl Prober<'_> {
         let (mut closed, mut score, mut rise) = (0.0, -probe.price, 0.0);
         for change in &probe.changes {
             let misfit = &self.inputs.best.misfits[change.stage];
-            let level = compare.mean_square(misfit).max(f64::MIN_POSITIVE);
             let gap = square * change.square / count(Role::Fit);
             closed += gap;
-            score += 0.5 * all * level / change.weight * (gap / level).ln_1p();
+            score += 0.5 * all * change.level / change.weight * (gap / change.level).ln_1p();
             rise += misfit.octaves.plus(&change.octaves.scaled(square)).rise(&misfit.octaves);
         }
         let acceptance = Acceptance { problem, thresholds };

@@ -150,8 +150,7 @@ pub(crate) fn held_out(
     let (compare, simulator) = (&problem.compare, problem.simulator());
     let metric = &compare.metrics[stage];
     let mut whole: Vec<f64> = apart.iter().zip(&metric.noise.sd).map(|(x, sd)| x / sd).collect();
-    let mut residual = whole.clone();
-    metric.clean(&compare.roles, &mut residual);
+    let mut residual = compare.clean(stage, &whole);
     let lines = simulator.lines(stage, model);
     for tested in compare.roles.of_role(Role::Test).map(|s| s.from..s.to) {
         let sd = &metric.noise.sd[tested.clone()];

@@ -201,8 +201,7 @@ impl<'a> Comparison<'a> {
 
     /// Returns a residual without its nuisances, over the fitted and over the held-out samples.
     pub(super) fn errors(&self, stage: usize, residual: &[f64]) -> Arc<Errors> {
-        let mut clean = residual.to_vec();
-        self.metrics[stage].clean(&self.roles, &mut clean);
+        let clean = self.clean(stage, residual);
         let of = |role| {
             let own = self.roles.of_role(role).flat_map(|s| &clean[s.from..s.to]);
             own.map(|x| *x as f32).collect()
@@ -222,17 +221,27 @@ impl<'a> Comparison<'a> {
         stage: usize,
         model: &Model,
     ) -> Result<f64, GapError> {
-        let mut values = self.residual_values(stage, model)?;
-        self.metrics[stage].clean(&self.roles, &mut values);
-        let parts = self.roles.of_role(Role::Fit).map(|s| &values[s.from..s.to]);
-        Ok(samples_per_observation(&parts.collect::<Vec<_>>(), self.roles.block))
+        let residual = self.residual_values(stage, model)?;
+        Ok(self.memory(&self.clean(stage, &residual)))
+    }
+
+    /// Returns how many samples of a residual without nuisances count as one observation.
+    pub(crate) fn memory(&self, clean: &[f64]) -> f64 {
+        let parts = self.roles.of_role(Role::Fit).map(|s| &clean[s.from..s.to]);
+        samples_per_observation(&parts.collect::<Vec<_>>(), self.roles.block)
+    }
+
+    /// Returns a residual in multiples of the noise without its most likely nuisances.
+    pub(crate) fn clean(&self, stage: usize, residual: &[f64]) -> Vec<f64> {
+        let mut clean = residual.to_vec();
+        self.metrics[stage].clean(&self.roles, &mut clean);
+        clean
     }
 
     /// Returns the mean squares by [octaves](crate::fit::octaves) of a residual in multiples of the
     /// noise, over fitted and held-out samples.
     pub(crate) fn octaves(&self, stage: usize, residual: &[f64]) -> Octaves {
-        let mut clean = residual.to_vec();
-        self.metrics[stage].clean(&self.roles, &mut clean);
+        let clean = self.clean(stage, residual);
         let mut octaves = Octaves::default();
         for s in self.roles.looked_at() {
             octaves.add(&residual[s.from..s.to], &clean[s.from..s.to]);

@@ -97,11 +97,7 @@ fn weigh(
     estimated: &Estimated,
 ) -> Result<Weighed, GapError> {
     let metric = &residue.compare.metrics[residue.stage];
-    let clean = |column: &Column| {
-        let mut values = column.values.clone();
-        metric.clean(residue.roles(), &mut values);
-        values
-    };
+    let clean = |column: &Column| residue.compare.clean(residue.stage, &column.values);
     let (alone, beside) = (clean(&residue.residual), clean(&estimated.left));
     // The cost of the choice is that of one term, because a function has at least one.
     let log_odds = odds(choice, &alone, &sum.beside_many, 1, sum.library);

@@ -148,9 +148,7 @@ struct Next {
 
 impl Pursuit<'_, '_> {
     fn clean(&mut self, column: &Column) {
-        let mut values = column.values.clone();
-        let compare = self.residue.compare;
-        compare.metrics[self.residue.stage].clean(&compare.roles, &mut values);
+        let values = self.residue.compare.clean(self.residue.stage, &column.values);
         self.cleaned.push(means(self.roles, Role::Fit, &values, self.count));
     }
 
@@ -212,9 +210,7 @@ impl Pursuit<'_, '_> {
             let known = residue.columns().iter().map(|c| Cow::Borrowed(&c.values));
             known.chain(promising.iter().map(|term| Cow::Owned(residue.values(term))))
         };
-        let mut residual = residue.residual.values.clone();
-        let compare = residue.compare;
-        compare.metrics[residue.stage].clean(&compare.roles, &mut residual);
+        let mut residual = residue.compare.clean(residue.stage, &residue.residual.values);
         let [mut fit, mut held] = [Role::Fit, Role::Held].map(|role| Rows {
             residual: means(self.roles, role, &residual, self.count),
             columns: Vec::new(),

@@ -345,6 +345,16 @@ fn several_gauges_err_less_than_one_and_a_lost_one_is_named() {
         "{said}"
     );
     assert!(whole < cut && cut < 20.0 * whole, "{cut} beside {whole}");
+    k.set(0);
+    scratch.worn("blank.csv", worn, |row| {
+        k.set(k.get() + 1);
+        row[0] = if (1000..3000).contains(&k.get()) { f64::NAN } else { row[0] };
+    });
+    let (blank, said) = scratch.errors("cal.json", "blank.csv", 3);
+    let left_out =
+        "s1 is left out of 2996 of 4000 samples, the first at 20.04 s: its samples are missing";
+    assert!(said.contains(left_out) && blank.len() == 4000, "{said}");
+    assert!(root_mean_square(&blank) < 20.0 * whole, "{said}");
     let (k, stuck_at) = (std::cell::Cell::new(0), std::cell::Cell::new(0.0));
     scratch.worn("stuck.csv", worn, |row| {
         k.set(k.get() + 1);

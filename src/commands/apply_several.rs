@@ -28,7 +28,7 @@ pub(super) fn apply_several(
     mut options: ReadOptions,
 ) -> anyhow::Result<()> {
     for channel in &calibration.spec().channels {
-        options = options.require(channel.signal.as_str());
+        options = options.require_with_gaps(channel.signal.as_str());
     }
     let trial = read_recording(trial, &options)?;
     let applied = apply_array(calibration, &trial)?;

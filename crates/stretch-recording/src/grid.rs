@@ -170,7 +170,11 @@ pub(crate) fn sparse(
     let is_sparse = |c: &Channel| {
         let lone = c.values.iter().zip(&filled).filter(|(x, n)| !x.is_finite() && **n == 0).count();
         let is_taken = !any_whole || is_needed(&c.name, options);
-        is_taken && has_blanks_between(&c.values) && BadRows::are_few(lone, blank(c))
+        let is_on_and_off = options.may_have_gaps(&c.name) && !alternates(&c.values);
+        is_taken
+            && !is_on_and_off
+            && has_blanks_between(&c.values)
+            && BadRows::are_few(lone, blank(c))
     };
     let (own, others): (Vec<_>, Vec<_>) = track.channels.into_iter().partition(is_sparse);
     let mut tracks: Vec<(Vec<usize>, Track)> = Vec::new();
@@ -209,6 +213,13 @@ fn has_blanks_between(values: &[f64]) -> bool {
     let between = &values[first..=last];
     let blank = between.iter().filter(|x| !x.is_finite()).count();
     !BadRows::are_few(blank, between.len())
+}
+
+/// Returns whether values and blanks change places as often as in a column that has a clock of its own: on average, at
+/// least one run of blanks for each ten values.
+fn alternates(values: &[f64]) -> bool {
+    let runs = values.windows(2).filter(|pair| pair[0].is_finite() && !pair[1].is_finite()).count();
+    runs * 10 >= values.iter().filter(|x| x.is_finite()).count()
 }
 
 /// Rewrites names with units in the project's notation, such as `pos_mm` for `Pos (mm)`. Requested names stay.
@@ -260,7 +271,8 @@ fn whole_channels(
         let of_it = || (0..channel.values.len()).filter(|i| !channel.values[*i].is_finite());
         let few = || BadRows::are_few(of_it().count() + holes.len(), channel.values.len());
         let is_needed = is_needed(&channel.name, options) || (options.all_columns && few());
-        if let Some(hole) = of_it().next().filter(|_| is_needed) {
+        let may_have_gaps = options.may_have_gaps(&channel.name);
+        if let Some(hole) = of_it().next().filter(|_| is_needed && !may_have_gaps) {
             let value = channel.values[hole].to_string();
             let row = track.stamps.rows.row(hole);
             holes.extend(of_it());

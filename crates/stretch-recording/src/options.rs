@@ -111,6 +111,7 @@ pub struct ReadOptions {
     pub(crate) time: String,
     pub(crate) time_unit: Option<TimeUnit>,
     required: Vec<String>,
+    gappy: Vec<String>,
     pub(crate) all_columns: bool,
     pub(crate) columns: Option<Vec<String>>,
     pub(crate) sample_rate_hz: Option<f64>,
@@ -131,6 +132,7 @@ impl Default for ReadOptions {
             time: TIME.to_owned(),
             time_unit: None,
             required: Vec::new(),
+            gappy: Vec::new(),
             all_columns: false,
             columns: None,
             sample_rate_hz: None,
@@ -173,6 +175,29 @@ impl ReadOptions {
     pub fn require(mut self, column: impl Into<String>) -> Self {
         self.required.push(column.into());
         self
+    }
+
+    /// Requires a column in which samples may be missing, such as one of several sensors. Rows without a number in it are
+    /// kept, and the sample is NaN.
+    ///
+    /// ```
+    /// use stretch_recording::{ReadOptions, Recording};
+    /// let text = "time_s,front_v,back_v\n0,1.1,2.1\n0.01,1.2,2.2\n0.02,,2.3\n0.03,1.4,2.4\n0.04,1.5,2.5\n0.05,1.6,2.6\n";
+    /// let options = ReadOptions::new().require_with_gaps("front_v").require_with_gaps("back_v");
+    /// let trial = Recording::from_reader(text.as_bytes(), "knee.csv", &options)?.trial;
+    /// assert_eq!(trial.channel("back_v"), Some(&[2.1, 2.2, 2.3, 2.4, 2.5, 2.6][..]));
+    /// assert!(trial.channel("front_v").is_some_and(|front_v| front_v[2].is_nan()));
+    /// # Ok::<(), stretch_recording::RecordingError>(())
+    /// ```
+    pub fn require_with_gaps(mut self, column: impl Into<String>) -> Self {
+        let column = column.into();
+        self.gappy.push(column.clone());
+        self.require(column)
+    }
+
+    /// Returns whether samples of a column may be missing without the loss of their rows.
+    pub(crate) fn may_have_gaps(&self, column: &str) -> bool {
+        self.gappy.iter().any(|name| name == column)
     }
 
     /// Also keeps the columns that are not required, if nearly all of their values are numbers. A row in which one of

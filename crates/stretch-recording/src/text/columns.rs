@@ -139,7 +139,9 @@ impl Columns {
         let most = if self.keeps_all { count } else { 0 };
         table.channels.retain(|c| is_needed(c) || BadRows::are_few(holes_of(c), most));
         let rows_with_holes = |channels: &[Channel]| -> Vec<usize> {
-            let is_hole = |i: &&usize| channels.iter().any(|c| c.values[**i].is_nan());
+            let is_hole = |i: &&usize| {
+                channels.iter().any(|c| c.values[**i].is_nan() && !options.may_have_gaps(&c.name))
+            };
             self.holes.iter().filter(is_hole).copied().collect()
         };
         let mut holes = rows_with_holes(&table.channels);
@@ -147,7 +149,9 @@ impl Columns {
             table.channels.retain(|c| is_needed(c) || holes_of(c) == 0);
             holes = rows_with_holes(&table.channels);
         }
-        first.retain(|(name, _)| table.channels.iter().any(|c| c.name == *name));
+        first.retain(|(name, _)| {
+            !options.may_have_gaps(name) && table.channels.iter().any(|c| c.name == *name)
+        });
         let first = first.into_iter().map(|(_, error)| error).min_by_key(RecordingError::row);
         if let Some(first) = first {
             bad.leave_out(holes.iter().map(|i| table.stamps.rows.row(*i)), first)?;

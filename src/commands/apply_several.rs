@@ -10,7 +10,7 @@ use stretch_data::{Trial, push_number, unit};
 use stretch_recording::ReadOptions;
 use stretch_sleeve::{
     AppliedArray, ArrayCalibration, ArrayChannel, ArrayLoss, ArrayReading, ArrayWithheld,
-    MAX_CHANNELS, apply_array,
+    MAX_CHANNELS, Shifts, apply_array,
 };
 
 use super::{apply::write_out, reading::read_recording, shared::with_unit};
@@ -83,18 +83,26 @@ pub(super) fn warnings<'a>(
     losses.chain(shifts(calibration, &trial.name, applied))
 }
 
-/// Returns a sentence for each time at which a gauge begins to deviate from the other gauges.
+/// Returns a sentence if a gauge begins to deviate from the other gauges and goes on to do so.
 fn shifts<'a>(
     calibration: &'a ArrayCalibration<MAX_CHANNELS>,
     trial: &'a str,
     applied: &'a AppliedArray,
 ) -> impl Iterator<Item = String> + 'a {
     let unit = unit(calibration.spec().reference.as_str()).unwrap_or_default();
-    // Consecutive blocks with a shift are one report, which names the gauges that all of these blocks name.
-    let runs = applied.shifts.chunk_by(|(_, a), (_, b)| (a.shifted != 0) == (b.shifted != 0));
-    runs.filter(|run| run[0].1.shifted != 0).filter_map(move |run| {
-        let (time_s, shifts) = &run[0];
-        let suspects = run.iter().fold(shifts.shifted, |all, (_, shifts)| {
+    // A gauge that was put on again stays shifted, whereas the memory of a sensor after a long hold fades. A shift therefore
+    // counts from the first block after which most of the blocks show one, and names the gauges that all of these name.
+    let is_shifted = |(_, shifts): &&(f64, Shifts<f64, MAX_CHANNELS>)| shifts.shifted != 0;
+    let lasts = |from: &usize| {
+        let after = &applied.shifts[*from..];
+        let shifted = after.iter().filter(is_shifted).count();
+        is_shifted(&&after[0]) && shifted > 1 && 2 * shifted > after.len()
+    };
+    let first = (0..applied.shifts.len()).find(lasts);
+    first.into_iter().filter_map(move |from| {
+        let (time_s, shifts) = &applied.shifts[from];
+        let run = applied.shifts[from..].iter().filter(is_shifted);
+        let suspects = run.fold(shifts.shifted, |all, (_, shifts)| {
             if all & shifts.shifted == 0 { all } else { all & shifts.shifted }
         });
         let limits = &calibration.spec().shifts.as_ref()?.limits;

@@ -73,8 +73,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         columns = columns.require(calibration.spec().signal.as_str());
         columns = columns.require(calibration.spec().reference.as_str());
     }
-    for name in several.iter().flat_map(|(_, calibration)| columns_of(calibration)) {
-        columns = columns.require(name);
+    for (_, calibration) in &several {
+        columns = columns.require(calibration.spec().reference.as_str());
+        for channel in &calibration.spec().channels {
+            columns = columns.require_with_gaps(channel.signal.as_str());
+        }
     }
     let renamed = "a calibration needs the columns that it was fitted to: rename them, and convert their units, with stretch convert --column NEW=OLD*FACTOR";
     let trials = read_trials(&args.trials, Split::Test, &columns)

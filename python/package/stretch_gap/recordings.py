@@ -26,7 +26,7 @@ class DoubtWarning(UserWarning):
     code : str
         Name of the reason for programs. It is stable between releases: `missing_samples`, `slow_clock`, `large_tolerance`,
         `other_rate`, `other_unit`, `constant_signal`, `outside_range`, `fitted_trials`, `other_reference`,
-        `constant_error`, `worse_than_the_mean` or `constant_reference`.
+        `constant_error`, `worse_than_the_mean`, `constant_reference` or `without_estimate`.
 
     Attributes
     ----------

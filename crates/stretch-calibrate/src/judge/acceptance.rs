@@ -64,6 +64,24 @@ pub fn outside_range(clamped: u64, samples: u64) -> Option<Doubt> {
     text.map(|text| Doubt::new("outside_range", text))
 }
 
+/// Returns a doubt for estimates that are missing after the first one of their trial: their samples do not count in the
+/// errors. The warm-up before that is no doubt.
+pub(super) fn without_estimate<'a>(trials: impl Iterator<Item = &'a [f64]>) -> Option<Doubt> {
+    let (mut missing, mut all) = (0, 0);
+    for estimates in trials {
+        let after = estimates.iter().skip_while(|estimate| estimate.is_nan());
+        missing += after.filter(|estimate| estimate.is_nan()).count();
+        all += estimates.len();
+    }
+    let percent = (100.0 * missing as f64 / all as f64).round();
+    let text = (percent > 0.0).then(|| {
+        format!(
+            "{percent} % of the samples have no estimate, and the errors are those of the others"
+        )
+    });
+    text.map(|text| Doubt::new("without_estimate", text))
+}
+
 /// Returns a doubt for estimates with a larger error than the mean of the reference.
 pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<Doubt> {
     let text = (errors.r_squared < 0.0).then(|| {

@@ -10,7 +10,7 @@ use stretch_receptor::{Domain, Reading, Withheld};
 use super::{
     acceptance::{
         beside_a_constant, fitted_trials, off_throughout, other_reference, outside_range,
-        worse_than_the_mean,
+        without_estimate, worse_than_the_mean,
     },
     apply::{Applied, at_rate},
     evaluate::Evaluation,
@@ -22,7 +22,8 @@ use crate::{error::PACE_TOLERANCE, prepare::Line};
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Doubt {
     /// Stable code for programs: `other_rate`, `constant_signal`, `other_unit`, `outside_range`, `fitted_trials`,
-    /// `other_reference`, `constant_error`, `worse_than_the_mean` or `constant_reference`.
+    /// `other_reference`, `constant_error`, `worse_than_the_mean`, `constant_reference` or
+    /// `without_estimate`.
     pub code: &'static str,
     /// A sentence for users that includes advice.
     pub text: String,
@@ -68,6 +69,7 @@ impl Doubt {
             all.extend(worse_than_the_mean(pooled));
         }
         all.extend(beside_a_constant(pooled));
+        all.extend(without_estimate(trials.iter().map(|trial| &trial.estimates[method][..])));
         all
     }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
-use stretch_core::{Calibration, Model};
+use stretch_core::{Calibration, Interval, Model};
 use stretch_data::Trial;
 use stretch_metrics::lag;
 use stretch_receptor::Reading;
@@ -78,6 +78,8 @@ pub(crate) struct Errors {
     /// Sum of squares and count for each kind of motion: arbitrary, pulses, ramps.
     kinds: [(f64, f64); 3],
     pub(crate) worst: f64,
+    /// Number of samples that are not judged, because their signal is outside the range of the fit without them.
+    pub(crate) not_judged: usize,
     /// Sum of the lags, in seconds, and their count.
     pub(crate) lag: (f64, f64),
 }
@@ -107,9 +109,16 @@ pub fn judge_model(
     for fold in folds(trials, &options) {
         let rest = without(trials, &fold, &options);
         let (calibrated, _) = calibrate_with(&rest, &options, choice.clone())?;
+        let fitted = fitted_range(&rest, &options)?;
         for &index in &fold.trials {
             let left_out = (&trials[index], fold.samples.clone());
-            errors.take_trial(&calibrated.calibration, left_out, turning[index], &options)?;
+            errors.take_trial(
+                &calibrated.calibration,
+                left_out,
+                fitted,
+                turning[index],
+                &options,
+            )?;
         }
     }
     Ok(Judged { parameters, errors })
@@ -172,6 +181,18 @@ fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
     rest
 }
 
+/// Returns the range of the fitted signal. A left-out sample beyond it is not judged, because a calibration to all data
+/// does not clamp this sample, and a line loses less by the clamp than a curve does. For a table, there is no limit: see
+/// [`beyond_its_ends`].
+fn fitted_range(fitted: &[Trial], options: &Options) -> Result<Interval, CalibrateError> {
+    if options.is_table {
+        return Ok(Interval { min: f64::NEG_INFINITY, max: f64::INFINITY });
+    }
+    let signals: Result<Vec<&[f64]>, _> =
+        fitted.iter().map(|trial| trial.require(&options.signal)).collect();
+    Ok(extent(signals?.into_iter().flatten().copied()))
+}
+
 /// Returns a line or a curve that is not clamped to the signals of its fit. If a table is fitted without its largest
 /// weight, the estimate of that weight is an extrapolation. Its error shows how good the form of the model is.
 fn beyond_its_ends(
@@ -206,19 +227,18 @@ impl Errors {
         &mut self,
         calibration: &Calibration,
         (trial, samples): (&Trial, Range<usize>),
+        fitted: Interval,
         turns: bool,
         options: &Options,
     ) -> Result<(), CalibrateError> {
+        let signals = trial.require(&options.signal)?;
         let reference = trial.require(&options.reference)?;
         let mut estimates = Vec::with_capacity(trial.len());
         let take = |reading: Result<Reading, _>| {
             estimates.push(reading.map_or(f64::NAN, |reading| reading.estimate));
         };
         match options.is_table {
-            true => {
-                let signals = trial.require(&options.signal)?;
-                each_reading(&beyond_its_ends(calibration.clone(), signals)?, trial, take)?
-            }
+            true => each_reading(&beyond_its_ends(calibration.clone(), signals)?, trial, take)?,
             false => each_reading(calibration, trial, take)?,
         };
         let period_s = 1.0 / sample_rate_hz(trial)?;
@@ -230,15 +250,25 @@ impl Errors {
         let settle = if options.is_table { 0 } else { SETTLE };
         let end = samples.end.min(trial.len());
         let judged = samples.start.max(settle).min(end)..end;
-        self.take(&reference[judged.clone()], &estimates[judged], period_s, which);
+        let is_fitted = |signal: &f64| (fitted.min..=fitted.max).contains(signal);
+        let is_judged: Vec<bool> = signals[judged.clone()].iter().map(is_fitted).collect();
+        self.take(&reference[judged.clone()], &estimates[judged], &is_judged, period_s, which);
         Ok(())
     }
 
-    fn take(&mut self, truth: &[f64], estimate: &[f64], period_s: f64, which: usize) {
+    fn take(
+        &mut self,
+        truth: &[f64],
+        estimate: &[f64],
+        is_judged: &[bool],
+        period_s: f64,
+        which: usize,
+    ) {
         let (mut sum, mut count) = (0.0, 0.0);
-        for (t, e) in truth.iter().zip(estimate) {
+        for ((t, e), is_judged) in truth.iter().zip(estimate).zip(is_judged) {
             let error = (t - e).abs();
-            if error.is_finite() {
+            self.not_judged += usize::from(!is_judged);
+            if error.is_finite() && *is_judged {
                 sum += error * error;
                 count += 1.0;
                 self.worst = self.worst.max(error);

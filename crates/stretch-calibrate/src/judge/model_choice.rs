@@ -218,7 +218,16 @@ pub fn choose_among(
         few if few < LEAST_TRIALS => "parts of the trials",
         _ => "trials",
     };
-    let notes = notes(trials, options, memory_shows);
+    let mut notes = notes(trials, options, memory_shows);
+    let samples: usize = trials.iter().map(Trial::len).sum();
+    let not_judged = found[bar].errors.as_ref().map_or(0, |errors| errors.not_judged);
+    let percent = (100.0 * not_judged as f64 / samples as f64).round();
+    if percent > 0.0 {
+        notes.push(format!(
+            "{percent} % of the samples did not count in the comparison, because their signal lies outside the range of the other {left_out}; \
+             move over the whole range several times, and calibrate again"
+        ));
+    }
     Some(ModelChoice { rows, model, left_out, why, notes })
 }
 

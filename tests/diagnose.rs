@@ -199,7 +199,7 @@ fn data_that_are_not_what_they_say_are_refused_by_name() {
     let zeros = spoiled("zeros", &|f| both(f, "pressure_kpa", |_, _| 0.0));
     fails(&mut diagnose(&zeros), &["pressure_kpa", "dead", "take the column out"]);
     let tests = spoiled("tests", &|f| describe(f, &[("fit.csv", "test"), ("test.csv", "test")]));
-    fails(&mut diagnose(&tests), &["no trial may be fitted", "not a test trial"]);
+    fails(&mut diagnose(&tests), &["there is no trial to fit", "not a test trial"]);
     let shut = spoiled("shut", &|f| {
         both(f, "inlet", |_, _| 0.0);
         both(f, "outlet", |_, _| 0.0);

@@ -19,7 +19,8 @@ pub(crate) struct Experiment {
     /// Published method: central differences, strain rate for calibration and voltage rate for use,
     /// each trial normalised by its own range, no dead band.
     pub(crate) published: Pipeline,
-    /// Our method: the same causal rate for calibration and use, fixed ranges, dead band.
+    /// Our method: the rate is from the same causal estimator in calibration and in use, every
+    /// trial is normalised by the ranges of the calibration, and there is a dead band.
     pub(crate) ours: Pipeline,
     /// Error as a function of the gap between two pulses.
     pub(crate) gaps: Vec<GapPoint>,

@@ -69,7 +69,7 @@ fn entries_of_a_problem_that_cannot_be_are_refused() {
         ("off = 0", "off = -3", "off = -3 is outside of its range, 0 to 20"),
         ("[\"command_V\"]", "[\"command_V\", \"angle_deg\"]", own),
         ("output.backlash", "output.backslash", "effect brake: there is no twin output.backslash"),
-        ("\"a.csv\"", "\"a.csv\"\nsplit = \"test\"", "no trial may be fitted"),
+        ("\"a.csv\"", "\"a.csv\"\nsplit = \"test\"", "there is no trial to fit"),
         // Times beyond the range of a clock do not cause a panic.
         ("start_s = 5", "start_s = 1e19\ndeadline_s = 1e19", "it closed its standard output"),
         ("start_s = 5", "start_s = 5", "it closed its standard output"),

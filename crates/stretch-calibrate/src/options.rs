@@ -172,7 +172,7 @@ impl fmt::Display for ModelKind {
 }
 
 const RATES: &str = "savgol:WINDOW,DEGREE[,DELAY] in samples, difference:CUTOFF_HZ, \
-                     tracker:INDEX, or central (logs only, not live)";
+                     tracker:INDEX, or central (for recordings, not live)";
 
 /// Parses a rate estimator: `savgol:11,2`, `savgol:11,2,5`, `difference:8`, `tracker:0.1`, `central`.
 ///

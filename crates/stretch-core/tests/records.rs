@@ -4,7 +4,8 @@ use proptest::{prelude::*, strategy::ValueTree, test_runner::TestRunner};
 use serde_json::{Value, json};
 use stretch_core::{Calibration, CalibrationSpec, Degree, DesignError, Model, Surface, strategies};
 
-/// Returns a valid calibration with surfaces as JSON, which tests then change.
+/// Returns a valid calibration in JSON, whose model is one with surfaces. Tests spoil a field of
+/// it.
 fn record() -> Value {
     let mut runner = TestRunner::deterministic();
     loop {

@@ -94,8 +94,9 @@ pub static HUM: Kind = Kind {
 /// Frequency of the mains.
 const MAINS: EffectParameter =
     EffectParameter::shape("f", "Hz", 50.0, 60.0, 50.0).linear().with_role(Role::Choice);
-/// At a sample rate of twice the mains frequency a hum appears with the amplitude a |sin(phase)|. The stand-in pi/4
-/// gives the root mean square of this amplitude over all phases.
+/// Phase of the hum. If the sample rate is twice the mains frequency, a hum of the amplitude A appears in the samples
+/// with the amplitude A |sin(phase)|. The phase pi/4, used until the phase is found, gives the root mean square of this
+/// amplitude over all phases.
 const PHASE: EffectParameter = EffectParameter::shape("phase", "rad", -TAU, TAU, 0.0)
     .linear()
     .with_role(Role::Found { stand_in: FRAC_PI_4 });

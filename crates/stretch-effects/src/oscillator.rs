@@ -240,10 +240,10 @@ pub static SECOND_ORDER_LAG: Kind = Kind {
 /// m^2 y'' = x - y + 2 damping m (x' - y')
 /// ```
 ///
-/// The solution is exact for an input that is linear between nodes, because the deviation from a ramp is a free
-/// oscillation. Unlike an [`Oscillator`](crate::Oscillator), whose damper connects the mass to the ground, the link
-/// follows a ramp without a lag and passes more of the high frequencies. The memory is the position, the velocity and
-/// the last input.
+/// The solution is exact for an input that is linear between nodes, because the link then moves along the same line
+/// plus a free oscillation. Unlike an [`Oscillator`](crate::Oscillator), whose damper connects the mass to the ground,
+/// the link follows a ramp without a lag and passes more of the high frequencies. The memory is the position, the
+/// velocity and the last input.
 ///
 /// Source: Spong 1987, doi:10.1115/1.3143860.
 ///

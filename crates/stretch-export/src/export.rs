@@ -207,8 +207,8 @@ fn float(
     Ok(assembled(Source::of(calibration, seal), options, Form::Float, part, &test))
 }
 
-/// Writes a calibration of several gauges as a header in `float`, like that of [`header`]. A step takes one sample of
-/// each gauge.
+/// Writes a calibration of several gauges as a C header that computes in `float`. It is used like a header from
+/// [`header`], but a step takes one sample of each gauge.
 ///
 /// # Errors
 /// [`ExportError::Refused`] if integers are requested, because several gauges have no integer form; also if the

@@ -66,8 +66,8 @@ impl fmt::Display for FilterError {
             Self::Design(error) => error.fmt(f),
             Self::LooksAhead { samples } => write!(
                 f,
-                "this rate estimator looks {samples} sample(s) ahead: it works on a log, \
-                 not live; choose a Savitzky-Golay, a differentiator or a tracker"
+                "this rate estimator needs {samples} future sample(s): live, use a causal Savitzky-Golay, \
+                 a differentiator or a tracker"
             ),
             Self::LengthsDiffer { log, other } => {
                 write!(f, "the log has {log} samples, but the other slice has {other}")

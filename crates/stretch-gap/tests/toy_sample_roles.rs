@@ -76,7 +76,7 @@ proptest! {
 fn a_session_of_tests_alone_is_refused_with_what_to_do() {
     let record = toy(vec![(1000, true), (1000, true)], 0.01).measured(1);
     let error = SampleRoles::of(&record).expect_err("nothing to fit").to_string();
-    assert_eq!(error, "no trial may be fitted: give at least one trial that is not a test trial");
+    assert_eq!(error, "there is no trial to fit: give at least one trial that is not a test trial");
 }
 
 /// The number of samples of the first trials includes test samples.

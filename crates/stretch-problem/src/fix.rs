@@ -177,7 +177,7 @@ impl<'a> Chosen<'a> {
             }
             VerdictKind::Parameters => "Parameters are re-tuned; no effect is added.".into(),
             VerdictKind::Partial => format!(
-                "{:.0} % of the gap remain: this file does not close it.",
+                "{:.0} % of the gap remains: this file does not close it.",
                 100.0 * self.diagnosis.unexplained.as_ref().map_or(0.0, |u| u.share)
             ),
             _ => "Parameters are re-tuned with the effects in place.".to_owned(),

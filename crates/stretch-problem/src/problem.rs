@@ -72,8 +72,8 @@ impl<S: Diagnosable + 'static> From<S> for Problem {
 pub struct Reading<'a> {
     /// Rig file that replaces the rig file of the data set.
     pub rig: Option<&'a Path>,
-    /// Names of the reference and signal columns, for a gauge alone or for a stage that is a
-    /// sensor.
+    /// Names of the reference and signal columns, for a gauge alone (a sensor and its reference, without
+    /// the rest of the rig) or for a stage that is a sensor.
     pub columns: Option<(&'a str, &'a str)>,
     /// A column that distinguishes runs ([`Problem::by_column`]), which is read in addition to those of the problem.
     pub by: Option<&'a str>,

@@ -41,7 +41,7 @@ impl fmt::Display for ReceptorError {
         match self {
             Self::Calibration(error) => error.fmt(f),
             Self::LooksAhead => f.write_str(
-                "the rate estimator looks ahead: it works on a log, not live; choose a Savitzky-Golay, a differentiator or a tracker",
+                "the rate estimator needs future samples: live, use a causal Savitzky-Golay, a differentiator or a tracker",
             ),
             Self::Rate => f.write_str(
                 "the rate estimator is not the one with which the calibration was fitted: design it with the window, the degree and the \

@@ -30,8 +30,9 @@ use crate::{
 ///   stretch-fleet ingest logs --lake lake --from-path '{site}/{rig}/{sensor}/{date}_*.csv'
 ///   stretch-fleet ingest monday/*.csv --lake lake --sensor 0042 --date 2026-11-21
 ///
-/// A trial is a recording in any format that stretch reads; a folder with a dataset.toml gives its
-/// trials, any other folder every file below it. Each becomes one Parquet file, whole or not at all.
+/// A trial is a recording in any format that the program stretch can read. A folder with a
+/// dataset.toml contributes the trials that this file lists, any other folder contributes every file
+/// below it. Each trial becomes one Parquet file, whole or not at all.
 /// Trials that are already in the lake are left unchanged. Files that cannot be read are named in the
 /// lake's folder refused, and the rest continues. If anything was refused the exit status is 1. Of
 /// files with the same bytes only one counts, whatever their names and dates.

@@ -226,11 +226,11 @@ pub fn golden() -> Result<String, JsError> {
     Ok(golden::checksums()?)
 }
 
-/// Returns the number of receptors, after checking that they compute the same bits as on a computer
-/// and on boards.
+/// Returns the number of receptors (live estimators), after checking that their results have the
+/// same bits as on a computer and on boards.
 ///
 /// # Errors
-/// A browser in which a receptor computes other bits.
+/// The result of a receptor in this browser differs, even if only in one bit.
 #[wasm_bindgen]
 pub fn sound() -> Result<usize, JsError> {
     Ok(golden::sound()?)

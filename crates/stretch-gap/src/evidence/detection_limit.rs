@@ -1,4 +1,5 @@
-//! Detection limits: how strong each effect would have to be to be named on these data.
+//! Detection limits: how strong each effect would have to be for a diagnosis of these data to name
+//! it.
 //!
 //! Assume that the re-tuned nominal simulator is true, that the residual of the best set of effects
 //! is noise, and that the rig has one more effect of the strength s. A *probe* is a simulation with
@@ -82,7 +83,8 @@ pub struct DetectionLimit {
     /// Value of the parameter at which the effect would be named with probability 0.9 if the
     /// re-tuned nominal simulator were otherwise true. A fit of an effect begins at several sets of
     /// values, its starts. The effect's other parameters have the values of the start at which the
-    /// effect is easiest to detect. `None` if no value within its range would be named.
+    /// effect is easiest to detect. `None` if the effect would not be named at any value within the
+    /// parameter's range.
     pub strength: Option<f64>,
     /// Unit of the value.
     pub unit: String,

@@ -105,9 +105,10 @@ impl Misfit {
     /// a slipping sleeve transmits less of this noise, and would win for any noisy input, whether
     /// the effect exists or not. Therefore hypotheses are compared at equal transmitted noise: X +
     /// k (T_nominal - T), where T is the transmitted noise, in variances of the noise. T is known
-    /// only approximately, and a gap may be input noise that is larger than estimated. Therefore,
-    /// if the hypothesis transmits less, k is the factor on the transmitted noise that would
-    /// explain the gap of the nominal simulator, at most 1 + [`LARGER`]; otherwise k is 1.
+    /// only approximately, and a gap may be input noise that is larger than estimated. If the
+    /// transmitted noise were larger by the factor k = 1 + gap/T_nominal, it would explain the
+    /// nominal simulator's gap completely. This k, limited to 1 + [`LARGER`], is used if T is less
+    /// than T_nominal; otherwise k is 1.
     pub(crate) fn at_equal_noise(&self, nominal: &Self, own: &Self, gap: f64) -> Self {
         let larger = 1.0 + (gap / nominal.fit.max(f64::MIN_POSITIVE)).min(LARGER);
         // If the noise is overestimated, the difference could be larger than the mean square.

@@ -239,7 +239,7 @@ fn left(
     residue.compare.metrics[residue.stage].column(residue.roles(), values)
 }
 
-/// Returns the share of the gap on the test trials that a refitted sum closes.
+/// Returns by which share a refitted sum of terms reduces the gap on the test trials.
 fn tested(residue: &Residue<'_>, terms: &[Term], estimated: &Estimated) -> Result<f64, GapError> {
     let (compare, stage) = (residue.compare, residue.stage);
     let trials = compare.simulator().trials().len();
@@ -266,8 +266,8 @@ fn tested(residue: &Residue<'_>, terms: &[Term], estimated: &Estimated) -> Resul
 
 /// Proposes a sum of terms for the remaining residual. If `names` is true, i.e. effects are named,
 /// this is the residual of the best set of effects. Otherwise it is the residual of the re-tuned
-/// nominal simulator; its proposal may be `known` already. A sum that closes nothing on the test
-/// trials is dropped.
+/// nominal simulator; its proposal may be `known` already. A proposed sum of terms is dropped if it
+/// does not reduce the gap on the test trials.
 pub(crate) fn propose_for(
     problem: &PreparedProblem<'_>,
     best: &Hypothesis,

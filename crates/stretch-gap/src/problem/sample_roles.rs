@@ -127,7 +127,7 @@ impl SampleRoles {
         let fitted = segments.iter().filter(|s| s.role == Role::Fit);
         let Some(last) = fitted.map(|s| s.trial).max() else {
             return Err(GapError::TooLittle {
-                what: "no trial may be fitted".into(),
+                what: "there is no trial to fit".into(),
                 hint: "give at least one trial that is not a test trial".into(),
             });
         };

@@ -1,5 +1,5 @@
 //! Notes about a verdict: gross errors, implausible noise, oscillating parameters, extrapolated
-//! drift, and effects that would have been named.
+//! drift, and how strong other effects would have to be for the diagnosis to name them.
 
 use stretch_data::in_digits;
 

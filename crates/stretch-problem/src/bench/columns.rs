@@ -75,7 +75,7 @@ impl Columns {
         let columns = Self::even(trials, names, shortest(trials))?;
         if !trials.is_empty() && trials.iter().all(|t| t.split == Split::Test) {
             let hint = "give at least one trial that is not a test trial";
-            return Err(ProblemError::too_little("no trial may be fitted", hint));
+            return Err(ProblemError::too_little("there is no trial to fit", hint));
         }
         if columns.trials.is_empty() {
             return Err(ProblemError::value(

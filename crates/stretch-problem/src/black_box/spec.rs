@@ -322,7 +322,7 @@ pub struct TrialFile {
     /// Session time of its first sample, s; default: the trial follows the previous one.
     #[serde(default, skip_serializing_if = "is_default")]
     pub start_s: f64,
-    /// `fit`, the default: it may be fitted; `test`: it is used once, for the test at the end.
+    /// `fit`, the default: for fitting; `test`: used only once, for the test at the end.
     #[serde(default, skip_serializing_if = "is_default")]
     pub split: Split,
 }

@@ -1,7 +1,7 @@
 //! Intermediate results that several runs share: pressures of the chamber, lengths of the muscle.
 //!
-//! Runs that differ in the muscle alone share the chamber's pressure. Runs that differ in the gauge alone share the simulated pressure and
-//! length that replace channels without a measurement.
+//! Runs that differ only in the muscle share the chamber's pressure. Runs that differ only in the gauge share the
+//! chamber's pressure and the muscle's length, where these are simulated because they were not measured.
 
 use std::{
     hash::Hash,

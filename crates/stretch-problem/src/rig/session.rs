@@ -74,7 +74,7 @@ impl RigSession {
         let has_pressure = with == trials.len();
         if trials.iter().all(|t| t.split == Split::Test) {
             let hint = "give at least one trial that is not a test trial";
-            return Err(ProblemError::too_little("no trial may be fitted", hint));
+            return Err(ProblemError::too_little("there is no trial to fit", hint));
         }
         let shares: Vec<f64> = trials.iter().map(excitation).collect::<Result<_, _>>()?;
         // Outliers are replaced before resampling, because resampling would spread an outlier over

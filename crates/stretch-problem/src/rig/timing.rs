@@ -1,8 +1,9 @@
 //! The times at which commands switch: at the rows of the log, or anywhere between two rows.
 //!
-//! A log as fast as the controller shows every switch in the row where the switch acts. A slower log, or a log with
-//! dropped rows, shows a switch up to one row late. In the sample before that row, the new opening then acts for a
-//! share of the sample, called the lead. The flow of this sample is the flow of the mean opening:
+//! A log as fast as the controller shows every switch of a valve in the row where the switch acts. A slower log, or a
+//! log with dropped rows, shows a switch up to one row late: the new valve opening already acts for a part of the
+//! sample interval before the row that shows it. This part, as a fraction of the interval, is called the lead. The flow
+//! during the interval is the flow of the mean opening:
 //!
 //! ```text
 //! u_i -> u_i + lead (u_(i+1) - u_i),     0 <= lead <= 1

@@ -25,9 +25,9 @@ use crate::{
 /// included in the count.
 ///
 /// A row whose time goes back is also an error, but the clock continues from there, so that only one row is lost when a
-/// logger restarts. A time that does not advance is an error only if neither the step of the clock nor an expected rate
-/// is known; otherwise such samples are spread over the step. A caller that keeps a state from row to row should reset
-/// it after an error of the time column.
+/// logger restarts. If several rows have the same time, their samples are spaced evenly over one clock step, or by the
+/// period of the expected sample rate. A repeated time is an error only if neither is known. A caller that keeps a
+/// state from row to row should reset it after an error of the time column.
 ///
 /// ```
 /// use stretch_recording::{ReadOptions, RowReader};

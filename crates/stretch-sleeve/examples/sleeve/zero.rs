@@ -148,7 +148,7 @@ fn table(title: &str, counts: &Counts) {
         counts.cases.len()
     );
     println!(
-        "| mean error from | gauges | reported | with the right sign | reported - mean error, median |"
+        "| mean error of at least | trials | shift reported | with the right sign | median of abs(reported shift - mean error) |"
     );
     println!("| --- | --- | --- | --- | --- |");
     for pair in LARGE.windows(2) {

@@ -1,11 +1,10 @@
-//! Many channels and their memories as the terms of one linear model. A bank is the set of these
-//! terms.
+//! One linear model of many channels and their memories. A bank is the set of the model's terms.
 //!
-//! The states of a channel `x` are those of a [`HistoryMap`](stretch_core::HistoryMap) with the
-//! time constants of [`BANK`]. The terms of a channel are products of its states. The first term of
-//! a bank is a constant. A polynomial of a shifted and scaled state is a polynomial of the same
-//! degree of the state itself. Therefore the rows of any two banks span the same functions, and
-//! [`Bank::row_matrix_of`] is the matrix between them.
+//! Each channel has the states of a [`HistoryMap`](stretch_core::HistoryMap): the signal x, and how
+//! much x has changed over each time constant in [`BANK`]. Each term of the model is a product of
+//! states of one channel; only the first term is a constant. A polynomial of a shifted and scaled
+//! state is a polynomial of the same degree of the state itself. Therefore the rows of any two
+//! banks span the same functions, and [`Bank::row_matrix_of`] is the matrix between them.
 
 use std::collections::HashMap;
 

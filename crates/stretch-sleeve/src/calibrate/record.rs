@@ -278,7 +278,7 @@ pub fn describe_record(path: &Path) -> Result<RecordSummary, CalibrateError> {
     if let Some(receptor) = BoardReceptor::new(&bytes)
         && let Ok(found) = record::seal(&bytes)
     {
-        let kind = format!("a receptor for converter codes of {} bits", receptor.adc_bits());
+        let kind = format!("a live estimator for converter codes of {} bits", receptor.adc_bits());
         let seal = found.unwrap_or_else(|| record::checksum(&bytes));
         return Ok(RecordSummary { kind, seal, is_sealed: found.is_some() });
     }

@@ -233,14 +233,14 @@ pub const RIG_STEP: f64 = 1e-4;
 /// samples determine the fit.
 pub const FIT_GROSS_ERRORS: f64 = 20.0;
 
-/// Millimetres of a 30 mm stroke: the difference between a receptor with memory in `f32` and the
-/// same one in `f64`. Its states are near 1 and have 24 bits; up to 35 terms have coefficients of
-/// up to 2.
+/// In millimetres, for a stroke of 30 mm: the difference between a receptor with memory in `f32`
+/// and the same one in `f64`. Its states are near 1 and have 24 bits; up to 35 terms have
+/// coefficients of up to 2.
 pub const REMEMBERING_F32_MM: f64 = 2e-2;
 
-/// Millimetres of a 30 mm stroke: error of an observer on its own gauge without noise. Its motion
-/// model has no acceleration, so it trails a sine of 0.6 Hz by about
-/// `acceleration * settling time^2`.
+/// In millimetres, for a stroke of 30 mm: the error of an observer on the noise-free signal of a
+/// gauge that is exactly the one the observer models. Its motion model has no acceleration, so it
+/// trails a sine of 0.6 Hz by about `acceleration * settling time^2`.
 pub const OBSERVER_INVERTS_MM: f64 = 0.5;
 
 /// Share of the stroke: the difference between an observer in integers and one in `f64`. Its states
@@ -296,7 +296,7 @@ pub const WHOLE_CODE: f64 = 1e-3;
 /// Hz and about 1.1 mm per V/s, makes one part. The stated error is the other: 0.9 + 0.6.
 pub const CODE_STEP_UM: f64 = 1.5;
 
-/// Millimetres of a 30 mm stroke: the error after the baseline has drifted by 0.1 V and was
+/// In millimetres, for a stroke of 30 mm: the error after the baseline has drifted by 0.1 V and was
 /// estimated again during a rest of 15 s.
 pub const REST_FOUND_MM: f64 = 0.5;
 

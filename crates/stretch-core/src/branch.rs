@@ -17,8 +17,8 @@ pub enum Branch {
 
 impl Branch {
     /// Returns the branch for a rate of the target, given the previous branch. The branch changes
-    /// only if the rate leaves the dead band (`|rate| > dead_band`). NaN keeps the branch. The
-    /// function works on floats and integers.
+    /// only if the rate leaves the dead band (`|rate| > dead_band`). If the rate is
+    /// NaN, the branch stays. The function works on floats and integers.
     ///
     /// ```
     /// use stretch_core::Branch;

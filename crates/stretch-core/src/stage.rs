@@ -68,7 +68,8 @@ impl<D: Design> Runner<D> {
         self.memory = self.design.memory();
     }
 
-    /// Returns the memory, for settings that a memory holds, such as the starting branch or the pressure of a receptor.
+    /// Returns the memory, so that a caller can set what it holds, such as a receptor's starting
+    /// branch or pressure.
     pub fn memory_mut(&mut self) -> &mut D::Memory {
         &mut self.memory
     }

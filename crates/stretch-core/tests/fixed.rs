@@ -28,7 +28,8 @@ fn half(n: i32) -> f64 {
     f64::from(n) / 2f64.powi(32)
 }
 
-/// Returns the surface with the largest multiple of `shape` that fits fixed point, to one part in 2^40.
+/// Returns a surface whose coefficients are `shape` times the largest factor for which they can be written in fixed
+/// point. The factor is exact to one part in 2^40.
 fn largest(shape: [f64; 7]) -> FixedPoly13 {
     let scaled = |k: f64| {
         let [p00, p10, p01, p11, p02, p12, p03] = shape.map(|c| c * k);

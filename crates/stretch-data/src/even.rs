@@ -89,7 +89,7 @@ pub struct EvenPart {
     pub begin_s: f64,
     /// Values of the requested columns, in the requested order; all have the same length.
     pub columns: Vec<Vec<f64>>,
-    /// For each sample, whether it was lost and is bridged.
+    /// For each sample, whether it was lost, so that its value was filled in.
     pub is_lost: Vec<bool>,
 }
 

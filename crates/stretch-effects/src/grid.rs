@@ -21,8 +21,8 @@ impl fmt::Display for GridError {
 
 impl core::error::Error for GridError {}
 
-/// Longest step of integration, s, that the nominal rig and every effect of the catalogue allow:
-/// halving it moves no channel by more than 1e-4 of its full scale.
+/// Longest integration step, s, that is short enough for the nominal rig and every effect of the
+/// catalogue: with half the step, no channel differs by more than 1e-4 of its full scale.
 pub const DEFAULT_STEP_S: f64 = 0.0025;
 
 /// Steps of integration inside one sample of a uniformly sampled trial, the same in every sample.

@@ -2,7 +2,7 @@
 
 use crate::{ExportError, Form, Header, constants::comment_safe, part::kept};
 
-/// A file of a library folder.
+/// A file of the Arduino library, which is a folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct File {
     /// Path in the folder, with `/` between its parts.

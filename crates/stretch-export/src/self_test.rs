@@ -47,7 +47,8 @@ struct Rounding {
 }
 
 impl Rounding {
-    /// Largest root mean square difference, as a share of the fit's error, for which a header is written.
+    /// A header is written only if the root mean square of the rounding differences is at most this share of the fit's
+    /// error.
     const MOST: f64 = 0.1;
 
     fn add(&mut self, single: f32, double: f64) {

@@ -37,7 +37,8 @@ fn white_noise_is_found_beside_motion_and_rests() {
     }
 }
 
-/// The noise scales with the unit of the recording; if the factor is a power of two, it does so to the bit.
+/// The estimated noise scales with the unit of the recording. If the factor is a power of two, it does so to the last
+/// bit.
 #[test]
 fn noise_is_in_the_unit_of_its_record() {
     let record = white(0.1, 1);

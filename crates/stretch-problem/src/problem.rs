@@ -29,7 +29,7 @@ pub trait Diagnosable: Simulator + Debug + Send {
         Vec::new()
     }
 
-    /// A recorded column by its name, all trials end to end.
+    /// A recorded column by its name, all trials concatenated.
     fn column(&self, name: &str) -> Option<Vec<f64>>;
 
     /// The experiment that would distinguish the alternatives of a diagnosis; `None` if no

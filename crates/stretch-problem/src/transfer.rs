@@ -19,7 +19,7 @@ use stretch_gap::{
 const SIGNAL: &str = "signal";
 const REFERENCE: &str = "reference";
 
-/// The motion and the signal that a calibration is trained on or applied to, all trials end to end.
+/// The motion and the signal that a calibration is trained on or applied to, all trials concatenated.
 struct Records {
     reference: Vec<f64>,
     signal: Vec<f64>,

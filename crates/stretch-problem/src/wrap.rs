@@ -48,9 +48,9 @@ pub(crate) struct Placed {
     pub(crate) parameters: Vec<EffectParameter>,
     /// Values at which the search begins.
     pub(crate) starts: Vec<Vec<f64>>,
-    /// The other channel that the wrapper depends on, all trials end to end.
+    /// The other channel that the wrapper depends on, all trials concatenated.
     beside: Option<Arc<Vec<f64>>>,
-    /// The channel that loads the contact, all trials end to end, with its name and unit.
+    /// The channel that loads the contact, all trials concatenated, with its name and unit.
     load: Option<(Arc<Vec<f64>>, String)>,
     aliases: Vec<String>,
 }

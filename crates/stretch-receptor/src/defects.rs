@@ -213,7 +213,8 @@ impl<T: Real> Relaxing<T> {
         }
     }
 
-    /// The contribution of the past to the drive; the drive of the sample itself has the weight [`Self::own`].
+    /// What earlier samples contribute to the relaxed drive. The present sample contributes its own drive times
+    /// [`Self::own`].
     #[inline(always)]
     fn past(fading: &[T; 3]) -> T {
         fading[0] + fading[1] + fading[2]

@@ -30,7 +30,7 @@ pub struct Recording {
     pub notes: Vec<String>,
 }
 
-/// Beginnings of the notes on a format that was read without a doubt.
+/// How those notes begin that report a fact about the format and not a guess.
 const CERTAIN: [&str; 5] = [
     "columns named with their units: ",
     "the time is column ",

@@ -32,7 +32,7 @@ pub fn stage_table(stages: &[StageGap], has_after: bool) -> Table {
         ]
     };
     Table::new(
-        "What is left on the test trials: root mean square, and in multiples (\u{d7}) of the noise",
+        "Remaining error on the test trials: root mean square, and in multiples (\u{d7}) of the noise",
         &["Stage", "Noise", "As shipped", "Re-tuned", "With the effect"],
         stages.iter().map(row),
     )

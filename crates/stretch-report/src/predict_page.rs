@@ -32,7 +32,7 @@ pub fn predict_page(prediction: &Prediction) -> String {
     page.table(&predict_table(prediction));
     for trial in &prediction.trials {
         let intro = match trial.extrapolated.is_empty() {
-            true => "All of it lies within the ranges that were fitted.",
+            true => "The whole recording lies within the ranges that were fitted.",
             false => {
                 "Parts are outside the ranges that were fitted: do not trust the prediction there."
             }

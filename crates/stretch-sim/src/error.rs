@@ -13,7 +13,7 @@ pub enum SimError {
     UnknownEffect {
         /// The name that was given.
         name: String,
-        /// The nearest name of the catalogue, when one is near.
+        /// The most similar name in the catalogue, if one is similar enough.
         nearest: Option<String>,
     },
     /// A rig file, an effect, a trial or a number was refused. The message names the value and what is needed.

@@ -45,7 +45,7 @@ pub(crate) struct View {
     refreshed: Instant,
 }
 
-/// Items for the writing thread.
+/// What the writing thread has to write.
 enum Shown {
     Rows(Vec<u8>),
     Note(String),

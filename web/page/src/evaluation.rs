@@ -24,7 +24,7 @@ impl From<Table> for Shown {
     }
 }
 
-/// Errors of calibrations, and doubts about them.
+/// Errors of calibrations, and reasons to doubt the calibrations.
 #[derive(Debug, Serialize)]
 pub(crate) struct Errors {
     sentence: String,

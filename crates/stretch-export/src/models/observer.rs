@@ -57,7 +57,7 @@ pub(crate) fn observer_fixed(observer: &IntegerObserver) -> Part {
         .define("ZERO", n.zero, "output at a target of 0")
         .define("GAIN", n.gain, "output per target")
         .define("OUTPUT_SHIFT", 26 + i32::from(n.output_bits), "")
-        .define("FOLLOWS_REST", i32::from(follows), "whether a baseline is followed");
+        .define("FOLLOWS_REST", i32::from(follows), "1 if a drifting baseline is tracked, else 0");
     if follows {
         let RestNumbers { level, pull, leak, average, most, furthest } = n.rest;
         let rest = RestLevel { level, pull, leak, average, furthest, most };
@@ -110,7 +110,7 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
         .define("DEAD_BAND", o.dead_band, "the branch changes only at a target rate above this one")
         .define("ZERO", o.zero, "reference at a target of 0")
         .define("GAIN", o.gain, "reference per target")
-        .define("FOLLOWS_REST", i32::from(follows), "whether a baseline is followed");
+        .define("FOLLOWS_REST", i32::from(follows), "1 if a drifting baseline is tracked, else 0");
     if follows {
         define_rest(&mut constants, o.at_rest, o.rest);
     }

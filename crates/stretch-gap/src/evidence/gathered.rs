@@ -91,7 +91,8 @@ pub struct Evidence {
     pub(crate) best_effect: Option<usize>,
     /// Size of the gap.
     pub(crate) gap: Excess,
-    /// Responses of the stage with the largest gap to the parameters of the best set. `None` if
+    /// How the output of the stage with the largest gap responds to each parameter of the best set
+    /// of effects. `None` if
     /// they were not [requested](crate::Options::responses), or if no effect of the set acts in
     /// this stage.
     pub responses: Option<Responses>,

@@ -2,9 +2,10 @@
 //! data like these. An excess within the band can be chance. If it is above the band, something is
 //! missing, although it may be too faint to name.
 //!
-//! Recordings in which nothing is missing are drawn for the given trials and noise. In the metric
-//! V, the output's own noise z is white whatever the nuisances are, so that N samples leave a
-//! chi-square variable with N degrees of freedom. The noise t is the part of the measured input's
+//! Recordings in which nothing is missing are drawn for the given trials and noise. V is the
+//! covariance of the noise and the nuisances (slow drifts and offsets). Whitened by V, the output's
+//! own noise is white noise z, whatever the nuisances are, and |z|^2 of N samples is a chi-square
+//! variable with N degrees of freedom. The noise t is the part of the measured input's
 //! noise that the simulator transmits to the output. It may be slow, and has the share u of the
 //! noise's variance. The reduced chi-square of a drawn recording is
 //!

@@ -29,9 +29,10 @@ const NEAR: usize = 25;
 /// At most one in this number of samples may be isolated.
 const RARE: usize = 200;
 
-/// Largest number of samples in a run.
+/// Largest number of samples in a row that together count as one outlier, a run.
 const RUN: usize = 5;
-/// Largest difference between the samples before and after a run, as a share of the run's height.
+/// Largest difference between the sample before a run and the sample after it, as a share of the
+/// run's height.
 const LEVEL: f64 = 0.25;
 
 /// Returns the indices of the isolated samples of a residual, in ascending order. `moves` holds,

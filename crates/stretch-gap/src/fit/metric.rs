@@ -34,7 +34,7 @@ use crate::{
 /// The metric of one stage.
 #[derive(Debug, Clone)]
 pub(crate) struct Metric {
-    /// One standard deviation of the noise, sample by sample.
+    /// Standard deviation of the noise, one value per sample.
     pub(crate) noise: NoiseLevel,
     /// Parameters of the stage that drift or are offset in each trial.
     loose: Vec<Loose>,

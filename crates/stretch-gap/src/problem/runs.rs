@@ -1,5 +1,5 @@
-//! Runs the simulator for the rest of the crate. Every run is counted, is not started once the
-//! caller asks to stop, and returns finite numbers or an error.
+//! Runs the simulator for the rest of the crate. Every run is counted, and it returns finite
+//! numbers or an error. Once the caller has asked to stop, no further run is started.
 
 use std::{
     collections::{BTreeMap, BTreeSet},

@@ -160,8 +160,9 @@ pub trait Simulator: Sync {
         self.wrapped().is_some_and(|wrapped| wrapped.is_costly(effect))
     }
 
-    /// Computes the sensitivities of a stage to its nominal parameters around a run. Later runs
-    /// that are [near](Run::near) its model may use them. The diagnosis calls this between
+    /// Computes the sensitivities of a stage's output to the nominal parameters, at the model of
+    /// this run. Later runs that are [near](Run::near) this model may use the sensitivities instead
+    /// of a simulation. The diagnosis calls this function between
     /// searches, never during one, so that the answer does not depend on the threads. By default
     /// nothing is computed, and every run is exact.
     ///

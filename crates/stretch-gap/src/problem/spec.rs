@@ -223,7 +223,7 @@ impl TrialSpec {
         Self { name: name.into(), samples, start_s, is_test }
     }
 
-    /// Returns the range of samples of each trial. The samples of all trials are stored end to end.
+    /// Returns the range of samples of each trial. The samples of all trials are concatenated.
     ///
     /// ```
     /// use stretch_gap::TrialSpec;

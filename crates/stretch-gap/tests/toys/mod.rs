@@ -63,7 +63,7 @@ pub(crate) struct Toy {
     pub(crate) units: [f64; 2],
     /// Budget of runs; `None` if runs are not counted.
     pub(crate) budget: Option<usize>,
-    /// Whether each sample, of all trials end to end, was lost (not measured); empty if all were measured.
+    /// For each sample of all trials concatenated, whether it was lost (not measured); empty if all were measured.
     pub(crate) is_lost: Vec<bool>,
     /// Stages whose first parameter is shared with another stage: the stage, and the index of the shared parameter.
     pub(crate) shared: Vec<(usize, usize)>,

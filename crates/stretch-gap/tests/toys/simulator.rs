@@ -17,7 +17,7 @@ use stretch_gap::{
 pub(crate) struct Measured {
     pub(crate) toy: Toy,
     description: Description,
-    /// The column `x`, all trials end to end.
+    /// The column `x`, all trials concatenated.
     pub(crate) x: Vec<f64>,
     /// Recorded output of each stage: the columns `y0`, `y1` and so on.
     pub(crate) outputs: Vec<Vec<f64>>,

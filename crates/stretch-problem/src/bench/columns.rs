@@ -21,7 +21,7 @@ fn shortest(trials: &[SessionTrial]) -> usize {
     ((SHORTEST_S * rate_hz) as usize).clamp(SHORTEST[0], SHORTEST[1])
 }
 
-/// Columns of all trials end to end.
+/// Columns of all trials, concatenated.
 #[derive(Debug, Clone)]
 pub(crate) struct Columns {
     pub(crate) names: Vec<String>,

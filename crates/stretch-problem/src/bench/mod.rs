@@ -65,7 +65,7 @@ impl Bench {
         Ok(Self { about: own.about.with_record(facts)?, ..own })
     }
 
-    /// The measured output of a stage, all trials end to end.
+    /// The measured output of a stage, all trials concatenated.
     pub(crate) fn measured(&self, stage: usize) -> &[f64] {
         self.columns.all(&self.about.stages[stage].channel)
     }

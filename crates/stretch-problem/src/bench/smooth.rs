@@ -196,7 +196,7 @@ impl MeasuredInput {
         Self { trials, noise, draws: LastResults::new(DRAWS) }
     }
 
-    /// All trials end to end.
+    /// Values of all trials, concatenated.
     pub(crate) fn values(&self) -> Vec<f64> {
         self.trials.iter().flat_map(|trial| &trial.values).copied().collect()
     }
@@ -206,7 +206,7 @@ impl MeasuredInput {
         self.trials[trial].values.first().copied()
     }
 
-    /// A trial, with the draw of its noise that belongs to a seed if there is one.
+    /// Values of a trial. If a seed is given, random noise is added, drawn with this seed.
     pub(crate) fn trial(&self, trial: usize, seed: Option<u64>) -> Vec<f64> {
         let values = &self.trials[trial].values;
         let Some(seed) = seed else { return values.clone() };

@@ -5,7 +5,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-/// A recorded session as a source receives it once: everything that stays the same from one run to the next.
+/// What a source of simulations receives once about a recorded session: everything that stays the same in all runs.
 ///
 /// Its serde form is the header of the message `session` of the worker protocol, which states the number of samples of
 /// each trial and omits the values of columns.
@@ -13,7 +13,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 pub struct RecordedSession {
     /// Sample time, s, the same in every trial.
     pub dt_s: f64,
-    /// The trials, in the order of time; all columns hold the trials end to end.
+    /// The trials, in the order of time; every column holds the trials concatenated.
     pub trials: Vec<SessionPart>,
     /// The stages of the simulator.
     pub stages: Vec<SessionStage>,
@@ -31,7 +31,7 @@ pub struct RecordedSession {
 pub struct SessionPart {
     /// Its name.
     pub name: String,
-    /// Range of its samples among those of all trials end to end.
+    /// Range of its samples among those of all trials concatenated.
     #[serde(with = "number")]
     pub samples: Range<usize>,
     /// Session time of its first sample, s.
@@ -56,7 +56,7 @@ pub struct SessionColumn {
     pub name: String,
     /// Unit, empty if none is known.
     pub unit: String,
-    /// Values, all trials end to end.
+    /// Values, all trials concatenated.
     #[serde(skip)]
     pub values: Vec<f64>,
 }
@@ -131,7 +131,7 @@ pub enum SourceError {
     Gone(String),
     /// The number of samples is not the one that was asked for.
     #[error(
-        "stage {stage}: the simulator gave {found} samples, {needed} were asked for; give one for each sample of the first {trials} trials, end to end"
+        "stage {stage}: the simulator gave {found} samples instead of {needed}: one for each sample of the first {trials} trial(s), one trial after the other"
     )]
     Length {
         /// The stage.

@@ -8,7 +8,7 @@ const LONGEST_S: f64 = 0.05;
 /// Greatest noise of a velocity, a share of the greatest velocity.
 const NOISY: f64 = 0.01;
 
-/// The velocity v_i = (x_(i+k) - x_(i-k))/(2 k dt) within each trial, all trials end to end. k is
+/// The velocity v_i = (x_(i+k) - x_(i-k))/(2 k dt) within each trial, all trials concatenated. k is
 /// doubled from 1 until the noise of the velocity is at most a hundredth of the greatest velocity,
 /// or 2 k dt reaches a twentieth of a second. The noise of the position is estimated from second
 /// differences. At the ends of a trial the difference is one-sided.
@@ -28,7 +28,8 @@ pub(crate) fn of_position(position: &[f64], trials: &[Range<usize>], dt_s: f64) 
     }
 }
 
-/// The position p_i = sum of (v_j + v_(j-1)) dt/2 within each trial, from 0, all trials end to end.
+/// The position p_i = sum of (v_j + v_(j-1)) dt/2 within each trial, from 0, all trials
+/// concatenated.
 pub(crate) fn integral_of(velocity: &[f64], trials: &[Range<usize>], dt_s: f64) -> Vec<f64> {
     let mut out = Vec::with_capacity(velocity.len());
     for trial in trials {

@@ -3,7 +3,7 @@
 use stretch_data::ends;
 use stretch_gap::TrialSpec;
 
-/// Samples that are fitted together, as indices into all trials end to end.
+/// Samples that are fitted together, as indices into all trials concatenated.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Group {
     pub(super) name: String,

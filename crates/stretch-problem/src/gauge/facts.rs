@@ -12,7 +12,8 @@ use crate::bench::{Bench, skew_of};
 /// catalogue has no skew.
 const SKEW_S: [f64; 2] = [-1.0, 1.0];
 
-/// The facts about a recording; `driving` is the smoothed reference that drives the gauge, all trials end to end.
+/// The facts about a recording; `driving` is the smoothed reference that drives the gauge, all
+/// trials concatenated.
 pub(super) fn facts(Bench { about, columns, .. }: &Bench, driving: Vec<f64>) -> RecordFacts {
     let (name, values) = (&columns.names[REFERENCE], &columns.values[REFERENCE]);
     let unit = unit_of(name);

@@ -24,7 +24,8 @@ const LEAST: f64 = 0.1;
 /// A swapped, negative or inverted length is recognised first. Otherwise the model
 /// `dx/dt = a u_in (1 - x) - b u_out x` (`x` from empty to full, `u` the openings) is fitted to the
 /// pressure if one was recorded, else to the length: with the valves' columns exchanged, with time
-/// reversed, and with the commands shifted. The error with the least sum of squares is named.
+/// reversed, and with the commands shifted. The error whose fit has the smallest sum of
+/// squares is reported.
 /// Shifts are penalised, because a search over many shifts reduces the sum of squares by chance.
 pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String) {
     let (mut with, mut seen) = (0.0, false);

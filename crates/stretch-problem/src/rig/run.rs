@@ -40,7 +40,7 @@ pub(super) struct Setting<'a> {
     /// Share of the settled state in the initial state of the stage, 0 to 1.
     pub(super) initial_share: f64,
     pub(super) input_noise: Option<u64>,
-    /// Input of the stage that replaces the measured one, all trials end to end.
+    /// Input of the stage that replaces the measured one, all trials concatenated.
     pub(super) given: Option<&'a [f64]>,
     pub(super) kind: RigStage,
 }

@@ -103,7 +103,7 @@ impl RigSession {
         &self.columns.trials
     }
 
-    /// A column, all trials end to end; empty for a pressure that was not recorded in every trial.
+    /// A column, all trials concatenated; empty for a pressure that was not recorded in every trial.
     pub fn column(&self, name: &str) -> &[f64] {
         self.columns.all(name)
     }
@@ -279,7 +279,7 @@ pub(crate) enum Begin {
 /// What drives the stages: commands, smoothed measured inputs, and the state of the chamber at the start of every trial.
 #[derive(Debug, Clone)]
 pub(super) struct Inputs {
-    /// Inlet and outlet, all trials end to end.
+    /// Inlet and outlet, all trials concatenated.
     pub(super) openings: [Vec<f64>; 2],
     pub(super) length: MeasuredInput,
     /// `None` if the pressure was not recorded.

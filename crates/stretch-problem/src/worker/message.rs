@@ -168,7 +168,7 @@ pub(super) fn read_outputs(
 ) -> Result<Vec<Result<Vec<f64>, SourceError>>, Wrong> {
     kind(frame, "outputs")?;
     let models = frame.header.get("models").and_then(Value::as_array);
-    let models = models.ok_or("its outputs have no list of models")?;
+    let models = models.ok_or("its answer has no list `models`")?;
     if models.len() != count {
         return Err(format!("it returned {} outputs for {count} models", models.len()));
     }

@@ -376,7 +376,7 @@ fn what_a_simulator_answers_wrongly_is_told() {
         diagnose(&bench, &Options::default(), &|_| (), &|| false).unwrap_err().to_string()
     };
     let short = with(|y| y[1..].to_vec());
-    assert!(short.contains("8999 samples, 9000 were asked for"), "{short}");
+    assert!(short.contains("8999 samples instead of 9000"), "{short}");
     let broken = with(|mut y| {
         y[4000] = f64::NAN;
         y

@@ -239,7 +239,7 @@ fn add_nanoseconds(track: &mut Track) -> Option<String> {
 /// Leaves out rows with impossible stamps, and adds a note.
 ///
 /// # Errors
-/// There are too many such rows, or the option `strict` allows none.
+/// There are too many rows with impossible stamps, or there is one and the option `strict` is set.
 fn leave_out(
     file: &str,
     track: &mut Track,

@@ -1,4 +1,4 @@
-//! Trials, lakes, and runs of the program.
+//! Helpers of the tests: they make trials and lakes, and run the program.
 
 use std::{
     collections::BTreeMap,

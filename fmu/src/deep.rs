@@ -8,7 +8,8 @@
 
 use std::{hint::black_box, mem::MaybeUninit};
 
-/// Distance between deep calls and calls from the top, bytes: the usual stack size of a program.
+/// Distance on the stack between the call that creates an instance and all other calls, bytes. It
+/// is the usual stack size of a program.
 const DEPTH: usize = 8 << 20;
 /// Stack size of a thread that makes deep calls, bytes.
 pub(crate) const STACK: usize = 3 * DEPTH;

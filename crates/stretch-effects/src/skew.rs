@@ -19,8 +19,8 @@ pub struct SkewSpec {
     pub skew_s: f64,
     /// Growth of the delay, s/s, as between two clocks of different rates.
     pub rate: f64,
-    /// Initial condition: before the first value arrives, the output is `1 - empty` times that value. At 0 the first
-    /// value is held; at 1 the output is zero.
+    /// Initial condition: before the first value arrives, the output is `1 - empty` times that value. If `empty` is 0,
+    /// the first value is held; if it is 1, the output is zero.
     pub empty: f64,
 }
 

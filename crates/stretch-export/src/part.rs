@@ -35,7 +35,7 @@ impl Part {
             .define("ZERO_LIMIT", limit, "limit for the change of the median across a pause")
             .define("ZERO_PAUSE", watch.pause_samples, "most samples of a movement without a pause")
             .define("ZERO_MOST", most, "largest deviation of a level that counts")
-            .define("ZERO_FOLLOW", watch.following(turns).follow, "share by which the zero follows")
+            .define("ZERO_FOLLOW", watch.following(turns).follow, "share of a deviation tracked")
             .define("ZERO_REFERENCE", watch.reference, "estimate per signal, times the sign");
         self.step.push(include_str!("c/zero_float.h"));
         self

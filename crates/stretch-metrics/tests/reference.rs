@@ -116,7 +116,8 @@ fn quantiles_agree_with_sixty_digits() {
     }
 }
 
-/// Neither argument alone makes a tail undefined, and both together do not.
+/// The tail is defined if t is infinite, also if the degrees of freedom are infinite at the same
+/// time.
 #[test]
 fn an_infinite_t_has_a_tail_of_zero_for_any_degrees_of_freedom() {
     for dof in [1.0, 1e6, f64::INFINITY] {

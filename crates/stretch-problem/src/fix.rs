@@ -251,10 +251,10 @@ fn of_unit(unit: &str) -> String {
 /// Time over which the phase of the mains is assumed constant, s.
 const STEADY_S: f64 = 1.0;
 
-/// Amplitude and phase of a sine in pairs of time (s) and value. One sine is fitted to all samples, and one to each
-/// second. If the sine of all samples has at least half of the mean power of the sines of the seconds, its amplitude
-/// and phase are returned. Otherwise the amplitude is the root of that mean power, and the phase is that of the sine of
-/// all samples.
+/// Amplitude and phase of a sine that is fitted to pairs of time (s) and value. One sine is fitted to all samples, and
+/// one to each second. If the sine of all samples has at least half of the mean power of the sines of the seconds, its
+/// amplitude and phase are returned. Otherwise the amplitude is the root of that mean power, and the phase is that of
+/// the sine of all samples.
 ///
 /// If the sample rate is twice the frequency, one quadrature cannot be observed and counts as zero.
 pub(crate) fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {

@@ -80,7 +80,7 @@ impl Source for Leg {
     }
 }
 
-/// What the commands lose on their way to the joints.
+/// Widths of the dead zone and of the play between the commands and the joints.
 #[derive(Clone, Copy)]
 struct Lost {
     /// Half width of the hip's dead zone, V.

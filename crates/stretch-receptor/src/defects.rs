@@ -309,8 +309,8 @@ impl<T: Real> Defects<T> {
         memory
     }
 
-    /// Returns the memory at the beginning of a further trial of the same session. The target is assumed to have gone
-    /// straight to `y` and rested there.
+    /// Returns the memory at the beginning of a further trial of the same session. Between the trials,
+    /// the target is assumed to have gone straight to `y` and rested there.
     pub fn carry(&self, before: &DefectsMemory<T>, y: T, pressure: T) -> DefectsMemory<T> {
         let mut memory = self.begin(y, pressure);
         let u = self.taut(y);

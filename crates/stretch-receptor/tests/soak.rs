@@ -151,8 +151,8 @@ fn records() -> Vec<(String, Calibration)> {
     all
 }
 
-/// Largest difference, as a share of the range, between a soaked receptor and a fresh one that saw the same clean
-/// samples since.
+/// Largest difference, as a share of the range, between a soaked receptor (one that has processed a long stream with
+/// faults) and a fresh receptor, after both have seen the same clean samples.
 ///
 /// A receptor that remembers a window of samples differs by rounding only, because the window was replaced. Filters
 /// that forget exponentially come as close as rounding lets them. Plays give two states with the same signal, and these

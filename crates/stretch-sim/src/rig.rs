@@ -14,7 +14,8 @@ use crate::{
     random::Random,
 };
 
-/// The gauge strain of a valid rig exceeds this over the whole stroke, so that its sleeve stays stretched.
+/// Smallest strain of the gauge. The strain of a valid rig exceeds it over the whole stroke, so that the sleeve stays
+/// stretched.
 pub const LEAST_STRAIN: f64 = 0.004;
 /// Table of a rig file that records how a simulation was run.
 const SIMULATION: &str = "simulation";

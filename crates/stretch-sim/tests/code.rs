@@ -14,8 +14,8 @@ use stretch_sim::{
     Start,
 };
 
-/// Difference between two mathematics libraries over four seconds of memory, as a share of the
-/// largest value.
+/// Largest accepted difference between results with two mathematics libraries, as a share of the
+/// largest value. An effect with memory accumulates such differences over the four seconds of a test.
 const SAME: f64 = 1e-9;
 const DT_S: f64 = 0.01;
 const SAMPLES: usize = 400;

@@ -75,8 +75,8 @@ struct Made {
     seed: u64,
     sensors: u32,
     days: u32,
-    /// Rows of all sensors and days. Existing ones are included, because a killed command may have
-    /// made them.
+    /// Number of rows of all sensors and days. Rows that existed already are counted as well,
+    /// because they may come from an earlier command that was killed.
     rows: u64,
     drifting: Vec<String>,
 }

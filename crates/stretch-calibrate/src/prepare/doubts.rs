@@ -131,7 +131,7 @@ impl Line {
         if slope.is_finite() { slope } else { 0.0 }
     }
 
-    /// Returns the reference at a signal.
+    /// Returns the reference that the regression line gives for a signal.
     pub(super) fn at(&self, signal: f64) -> f64 {
         self.means[1] + self.slope() * (signal - self.means[0])
     }
@@ -217,8 +217,8 @@ impl Held<'_> {
     }
 }
 
-/// Whether two columns are equal within the digits with which one of them was saved. Two repetitions of a motion are
-/// not equal.
+/// Whether two columns are equal within the digits with which one of them was saved. Two recordings of
+/// the same motion, repeated, are not equal in this sense.
 fn is_same(one: &[f64], other: &[f64]) -> bool {
     one.len() == other.len() && (one == other || is_rounded(one, other) || is_rounded(other, one))
 }

@@ -130,8 +130,8 @@ impl Prepared {
         })?)
     }
 
-    /// Returns each series with the fold of each of its samples in cross-validation. The fold is that of the trial, or
-    /// a tenth of all samples if there are fewer than [`LEAST_TRIALS`] trials.
+    /// Returns each series with the fold of each of its samples in cross-validation. Each trial is a fold. If there
+    /// are fewer than [`LEAST_TRIALS`] trials, each tenth of all samples is a fold.
     pub(crate) fn folds(&self) -> impl Iterator<Item = (&Series, Vec<usize>)> {
         let trials = self.series.iter().map(|s| s.trial).max().map_or(0, |last| last + 1);
         let total: usize = self.series.iter().map(|s| s.signal.len()).sum();

@@ -114,7 +114,7 @@ impl Outputs {
     /// immediately.
     ///
     /// # Errors
-    /// As [`write_whole`]; two files with the same name.
+    /// Those of [`write_whole`]; also if two files have the same name.
     pub fn file(
         &mut self,
         path: impl AsRef<Path>,

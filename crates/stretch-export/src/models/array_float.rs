@@ -30,7 +30,7 @@ pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> 
     if numbers.relaxations > 0 {
         has.push("relaxes");
         constants
-            .define("RELAXATIONS", numbers.relaxations as i32, "low-pass filters of a channel")
+            .define("RELAXATIONS", numbers.relaxations as i32, "low-pass filters per channel")
             .array("float", "shares", &numbers.shares[..numbers.relaxations]);
     }
     channels(&mut constants, numbers);

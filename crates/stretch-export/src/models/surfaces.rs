@@ -145,7 +145,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
         Map::Line(line) => {
             let Line { signal, offset, slope, intercept } = line;
             constants
-                .define("SIGNAL_MIN", signal.min, "range of the signal in the fit")
+                .define("SIGNAL_MIN", signal.min, "range of the signal in the fitted data")
                 .define("SIGNAL_MAX", signal.max, "")
                 .define("OFFSET", *offset, "")
                 .define("SLOPE", *slope, "")
@@ -160,7 +160,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             let degree = curve.surface.degree();
             let coefficients = curve.surface.coefficients();
             constants
-                .define("SIGNAL_MIN", curve.signal.min, "range of the signal in the fit")
+                .define("SIGNAL_MIN", curve.signal.min, "range of the signal in the fitted data")
                 .define("SIGNAL_MAX", curve.signal.max, "")
                 .define("RATE_MIN", curve.rate.min, "range of its rate in the fit")
                 .define("RATE_MAX", curve.rate.max, "")

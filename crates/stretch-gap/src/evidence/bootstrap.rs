@@ -10,7 +10,7 @@ use crate::{
     numerics::random::RandomGenerator,
 };
 
-/// Draws of the bootstrap.
+/// Number of resampled recordings of the bootstrap (draws).
 const DRAWS: usize = 400;
 
 /// Closed-gap fraction on the blocks of the test trials. `before` and `after` are the gaps without

@@ -77,11 +77,11 @@ pub struct Evidence {
     pub step: f64,
     /// Fitted model of every candidate, in the order of the candidates in the diagnosis.
     pub candidates: Vec<Model>,
-    /// One standard deviation of every re-tuned nominal parameter, 0 if it is exact.
+    /// Standard deviation of every re-tuned nominal parameter, 0 if it is exact.
     pub retuned_sd: Vec<f64>,
-    /// One standard deviation of every nominal parameter of every candidate.
+    /// Standard deviation of every nominal parameter of every candidate.
     pub candidate_sds: Vec<Vec<f64>>,
-    /// One standard deviation of every nominal parameter with the best set.
+    /// Standard deviation of every nominal parameter with the best set.
     pub(crate) best_sd: Vec<f64>,
     /// Reduced chi-square of the re-tuned nominal simulator by block, one entry per stage.
     pub(crate) nominal_blocks: Vec<Blocks>,

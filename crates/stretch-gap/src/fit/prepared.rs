@@ -123,7 +123,7 @@ impl<'a> PreparedProblem<'a> {
         Ok(Some(other.with_starts(self.starts)))
     }
 
-    /// The same problem with these results of re-tuning from several starts.
+    /// Returns the same problem, with `starts` as the results of re-tuning from several starting points.
     pub(super) fn with_starts(self, starts: Starts) -> Self {
         Self { starts, ..self }
     }

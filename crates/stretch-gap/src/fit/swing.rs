@@ -16,7 +16,7 @@
 //! The equations are those of Rasmussen and Williams (2006, section 2.7). Without a drift, ln B is
 //! the periodogram of Bretthorst (1988, doi 10.1007/978-1-4684-9399-3). If the median of |q|^2
 //! around f is larger than V predicts, V is scaled up, because a wrong form of an effect also
-//! leaves power, but not only at f. B is averaged over amplitudes and over all frequencies. It is
+//! leaves power, but not only at f. B is averaged over all amplitudes and frequencies of the line. It is
 //! computed only at the strongest peaks and counts as 0 elsewhere, which favours the drift. The
 //! prior odds are even.
 

@@ -222,7 +222,7 @@ fn factor(factor: Factor, signals: &[SignalScale]) -> String {
     }
 }
 
-/// Returns a text that tells where a sum acts.
+/// Returns words for where a sum of terms acts: on the output of the stage, or on its rate.
 pub(crate) fn acts(stage: &str, terms: &[ProposedTerm]) -> String {
     let is_rate = |t: &ProposedTerm| matches!(t.form.passage, Passage::Leak { .. });
     match terms.iter().any(is_rate) {

@@ -141,7 +141,7 @@ impl Description {
         out
     }
 
-    /// Returns the description with every parameter replaced by what `altered` returns. The result
+    /// Returns the description with every parameter replaced by the one that `altered` returns. The result
     /// must be valid.
     pub(crate) fn with_parameters(
         &self,

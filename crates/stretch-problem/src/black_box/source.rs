@@ -226,8 +226,8 @@ pub trait Source: Send + Sync {
         true
     }
 
-    /// Whether a source that [answers all stages](Source::answers_all) is also driven by the altered columns of
-    /// [other stages](Ask::others).
+    /// Whether a source that [answers all stages](Source::answers_all) can take altered columns of several stages in
+    /// one request, in addition to those of the stage asked for ([`Ask::others`]).
     fn takes_inputs_of_several(&self) -> bool {
         false
     }

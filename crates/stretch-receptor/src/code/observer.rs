@@ -14,7 +14,7 @@ use crate::{Domain, Front, ReceptorError, front::Live, gains::SLOPES};
 
 /// Largest rate: the whole target range in one sample.
 const FASTEST: i32 = 1 << TARGET_BITS;
-/// Target of a memory that has seen no sample. The value is below every target that a calibration may allow.
+/// Target of a memory that has seen no sample. No calibration can have a target as low as this value.
 const UNBEGUN: i32 = i32::MIN;
 /// Largest magnitude of a relaxation.
 const FURTHEST: i32 = 8 << TARGET_BITS;

@@ -84,7 +84,10 @@ impl Pneumatics {
                     volumes.push(law);
                 }
                 Action::Droop(_) if droops.len() == MOST_DROOPS => {
-                    return Err(SimError::not_here(active.name(), "a third state of the supply"));
+                    return Err(SimError::not_here(
+                        active.name(),
+                        "a supply on which more than two effects act",
+                    ));
                 }
                 Action::Droop(droop) => droops.push(droop),
                 _ => {}

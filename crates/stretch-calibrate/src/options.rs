@@ -226,9 +226,9 @@ pub struct Options {
     pub split: SplitBy,
     /// Robust weighting of the residuals.
     pub robust: Robust,
-    /// The signal's zero in [`Normalisation::Range`]. If `None`, it is 1.24 V for a `bridge_v` with values near 1.24 V.
-    /// For other signals it is the middle of the signal's range, because powers of a signal with a large offset lose
-    /// digits by cancellation.
+    /// The signal that [`Normalisation::Range`] maps to zero. If `None`, it is 1.24 V for a `bridge_v` with values near
+    /// 1.24 V. For other signals it is the middle of the signal's range, because powers of a signal with a large offset
+    /// lose digits by cancellation.
     pub signal_zero: Option<f64>,
     /// Resting length; the target is then the contraction. If `None`, the resting length of a reference whose name
     /// begins with `length` is its greatest value, and any other reference is the target itself.

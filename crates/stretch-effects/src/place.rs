@@ -146,8 +146,8 @@ pub struct Surroundings<'a> {
     pub grid: &'a Grid,
     /// Strain that is used as e0. In a rig it is the pre-stretch; for a gauge without its rig it is 1.
     pub strain_scale: f64,
-    /// Range of the strain over the stroke, (1 + e0) k_max; 1 for a gauge without its rig. It scales the state that an
-    /// unrecorded motion leaves.
+    /// Range of the strain over the stroke, (1 + e0) k_max; 1 for a gauge without its rig. States that are left
+    /// by motion before the recording are multiples of this range.
     pub strain_stroke: f64,
     /// Stroke of the contraction: k_max.
     pub contraction_stroke: f64,

@@ -95,7 +95,10 @@ pub(crate) fn facts(d: &Diagnosis) -> Vec<(&'static str, String)> {
         VerdictKind::NoGap => "Nothing.".to_owned(),
         VerdictKind::Record => {
             let what: Vec<&str> = d.gross.iter().map(|g| g.hint.as_str()).take(1).collect();
-            format!("Nothing until the recording and the parameters are right: {}.", what.concat())
+            format!(
+                "Nothing yet. The recording and the parameters have to be right first: {}.",
+                what.concat()
+            )
         }
     };
     let sure = match (d.verdict, best) {

@@ -6,8 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-/// Rows per column that are collected before they are folded. The triangle has one row per column, so it then adds a
-/// quarter to the cost.
+/// Number of rows per column that are collected before they are folded into the triangle. The triangle itself has one
+/// row per column and is folded with them, which adds a quarter to the cost.
 const WAITING: usize = 4;
 /// Smallest number of rows that are collected before they are folded.
 const LEAST_WAITING: usize = 64;

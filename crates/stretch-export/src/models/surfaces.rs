@@ -162,7 +162,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             constants
                 .define("SIGNAL_MIN", curve.signal.min, "range of the signal in the fitted data")
                 .define("SIGNAL_MAX", curve.signal.max, "")
-                .define("RATE_MIN", curve.rate.min, "range of its rate in the fit")
+                .define("RATE_MIN", curve.rate.min, "range of its rate in the fitted data")
                 .define("RATE_MAX", curve.rate.max, "")
                 .define("OFFSET", curve.offset, "")
                 .define("DEGREE", i32::from(degree.volts()), "")

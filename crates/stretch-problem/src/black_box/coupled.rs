@@ -35,7 +35,7 @@ const LOOKED_AT: &str = "these outputs are compared as well";
 const LEFT_OUT: &str = "this is left out, because the simulator takes altered inputs of one stage at a time (a worker that can take \
     more sets several = true in its hello)";
 
-/// Stages on which the wrappers in front of stages act.
+/// The stages on which each wrapper of an input acts.
 #[derive(Debug, Clone)]
 pub(super) struct Coupled {
     /// The problem's description, in which each effect lists every stage that it moves; `None` if

@@ -143,8 +143,8 @@ impl BlackBox {
         1 + each.sum::<usize>() + self.draws() + probes + usize::from(stands && probes > 0)
     }
 
-    /// The stages on which the wrappers in front of stages act. The first call makes runs to find
-    /// them.
+    /// Returns on which stages each wrapper of an input acts. The first call makes runs to find this
+    /// out.
     fn coupled(&self) -> &Coupled {
         self.coupled.get_or_init(|| Coupled::of(&self.problem, &self.runs, &self.probes))
     }

@@ -63,7 +63,7 @@ pub struct ObserverNumbers {
     pub relaxations: u8,
     /// Number of plays.
     pub plays: u8,
-    /// Slopes, in signal per knot, between which the row of `gains` changes.
+    /// Slopes of the curve, in signal per knot, that separate the rows of `gains`.
     pub ends: [i32; SLOPES - 1],
     /// Kalman gains as change of the state per unit of signal, times `2^gain_bits`; one row per slope.
     pub gains: [[i32; STATES]; SLOPES],

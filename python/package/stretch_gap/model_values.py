@@ -112,6 +112,8 @@ def _delayed(diagnosis: Diagnosis, spec: Any, name: str) -> bool:
     own = [actuator for actuator in spec.actuators if actuator.target == joint]
     if kind != "delay" or "output" in place or len(own) != 1 or not hasattr(own[0], "delay"):
         return False
-    own[0].delay = diagnosis.effects[name]["delay_s"]
-    own[0].nsample = int(np.ceil(own[0].delay / spec.option.timestep)) + 2
+    # MuJoCo rounds a delay up to whole steps, and a delay that is longer by an error of the fit would act a step too late
+    steps = max(1, round(diagnosis.effects[name]["delay_s"] / spec.option.timestep))
+    own[0].delay = (steps - 0.5) * spec.option.timestep
+    own[0].nsample = steps + 2
     return True

@@ -312,6 +312,7 @@ pub static CLOCK_DRIFT: Kind = Kind {
             .with("DT", signals.dt_s, "s")
     }),
     twins: &["skew", "delay", "lag"],
+    family: Some((Family::Late, |v| v[1])),
     drifts: true,
     ..Kind::PLAIN
 };

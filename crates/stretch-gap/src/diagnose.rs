@@ -552,7 +552,7 @@ fn report(
         null_band,
         detection_limits,
         location,
-        parameters: shifts(simulator, &evidence),
+        parameters: shifts(simulator, &evidence, is_quiet),
         identifiability,
         transfer: None,
         next_experiment: None,

@@ -337,9 +337,11 @@ fn thirds(view: &BranchView<'_>) -> Vec<Vec<[f64; 3]>> {
     by_pace.chunks(by_pace.len().div_ceil(3).max(1)).map(<[_]>::to_vec).collect()
 }
 
-/// The median rate of a third, and the surface at that rate over the signals of the third.
+/// The median size of the rates of a third, with the sign that prevails on the branch, and the surface at that rate over
+/// the signals of the third. Near a reversal, a branch also has rates of the other sign.
 fn curve(view: &BranchView<'_>, third: &[[f64; 3]]) -> Option<(f64, Vec<(f64, f64)>)> {
-    let rates = sorted(third.iter().map(|s| s[0]));
+    let sign = view.cloud.iter().map(|s| s[0]).sum::<f64>().signum();
+    let rates = sorted(third.iter().map(|s| sign * s[0].abs()));
     let signals = sorted(third.iter().map(|s| s[1]));
     let (rate, seen) = (quantile(&rates, 0.5), quantile(&signals, 0.01)..quantile(&signals, 0.99));
     let at = |k: i32| seen.start + (seen.end - seen.start) * f64::from(k) / 60.0;

@@ -281,7 +281,7 @@ pub(super) fn doubts(
     if rate_hz < SLOW_HZ && samples >= TELLING && !options.is_table {
         said.push(format!(
             "the trials have {rate_hz:.4} samples a second: are their times in milliseconds? If so, convert them to seconds (in the program \
-             with --time time_s:ms), which makes the rates 1000 times as high"
+             with --time COL:ms, where COL is the time column), which makes the rates 1000 times as high"
         ));
     }
     let all = Line::of(pieces.iter()).spreads[1];

@@ -349,16 +349,25 @@ pub(crate) fn stage_gaps(problem: &PreparedProblem<'_>, evidence: &Evidence) -> 
     evidence.stages.iter().enumerate().map(one).collect()
 }
 
-/// Returns how far every parameter with a tolerance moved.
-pub(crate) fn shifts(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<ParameterShift> {
-    let (fitted, bent) = (&evidence.best.parameters, &evidence.retuned.parameters);
+/// Returns how far every parameter with a tolerance moved: in the fit with the best set of effects, or without effects
+/// if the verdict names none because the simulator agrees, perhaps after re-tuning.
+pub(crate) fn shifts(
+    simulator: &dyn Simulator,
+    evidence: &Evidence,
+    agrees: bool,
+) -> Vec<ParameterShift> {
+    let bent = &evidence.retuned.parameters;
+    let (fitted, sd) = match agrees {
+        true => (bent, &evidence.retuned_sd),
+        false => (&evidence.best.parameters, &evidence.best_sd),
+    };
     let all = simulator.parameters().iter().enumerate().filter(|(_, p)| p.sd > 0.0);
     all.map(|(i, p)| ParameterShift {
         name: p.name.clone(),
         unit: p.unit.clone(),
         nominal: p.nominal,
         fitted: fitted[i],
-        sd: evidence.best_sd[i],
+        sd: sd[i],
         sigmas: (fitted[i] - p.nominal) / p.sd,
         bent: bent[i],
         bent_sigmas: (bent[i] - p.nominal) / p.sd,

@@ -83,8 +83,8 @@ pub fn missing_turns(gauge: &GaugeCalibration, trials: &[Trial]) -> Option<Strin
     let ends = |signal: &&[f64]| moves(finder, signal, spec.polarity.sign()).count();
     Some(format!(
         "the calibration lacks the levels at which movements reverse, so that stretch apply cannot detect that the gauge was put on again: \
-         {} movements were found, and at least {LEAST_MOVEMENTS} are needed whose levels do not follow those before them (as they do in a drift) and \
-         that are larger than the noise; record a minute or more of movements over the whole range",
+         it needs at least {LEAST_MOVEMENTS} movements that return to the same end, without a drift, and of {} movements too few do; record a minute \
+         or more of movements that all reach the same end, such as a fully stretched limb",
         signals.iter().map(ends).sum::<usize>()
     ))
 }

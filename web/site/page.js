@@ -12,8 +12,21 @@ const MOST_OPEN = 4;
 const MOST_POINTS = 1500;
 
 const page = {
-  /** @param {Map<string, File>} files Reads what was dropped beside what is there. */
-  take: (files) => tell.busy("reading", async () => {
+  /** @param {Map<string, File>} files Reads what was dropped beside what is there; a recording with other columns replaces the sample. */
+  async take(files) {
+    await page.read(files);
+    const columns = [...state.recordings.values()].map(({ name, columns }) => ({ name, names: columns.map((c) => c.name) }));
+    const sample = columns.find(({ name }) => page.sampled.has(name))?.names ?? [];
+    const isOther = columns.some(({ name, names }) => files.has(name) && !page.sampled.has(name) && !sample.every((column) => names.includes(column)));
+    if (!isOther || !sample.length) return;
+    page.clear();
+    await page.read(files);
+  },
+  /** Names of the recordings of the sample. @type {Set<string>} */
+  sampled: new Set(),
+
+  /** @param {Map<string, File>} files */
+  read: (files) => tell.busy("reading", async () => {
     page.changed("calibrated", "diagnosed", "evaluated");
     for (const [name, file] of files) {
       // of several calibration files or rig files the last one counts
@@ -183,6 +196,7 @@ const page = {
     state.recordings.clear();
     state.held.clear();
     page.refused.clear();
+    page.sampled.clear();
     state.dropped = null;
     for (const id of ["calibrated", "diagnosed", "evaluated"]) html(id).hidden = true;
     tell.list("record-doubts", []);
@@ -197,7 +211,10 @@ const page = {
     const made = tell.busy("simulating a session", async () => {
       for (const { name, text } of JSON.parse(await crew.hand(CALIBRATOR).call("sample", SAMPLE))) files.set(name, new File([text], name));
     });
-    return made.then(() => (files.size ? page.take(files) : undefined));
+    return made.then(() => {
+      page.sampled = new Set(files.keys());
+      return files.size ? page.take(files) : undefined;
+    });
   },
 };
 
@@ -295,6 +312,7 @@ const dropped = {
   button("save-rig").onclick = () => diagnosis.save("fixed.toml", "rig");
   button("save-report").onclick = () => tell.save(report.name, report.text, "text/html");
   button("close-report").onclick = report.close;
+  window.addEventListener("resize", report.fit);
   window.addEventListener("resize", () => { if (page.lines.length) plot.draw(part("look", HTMLCanvasElement), page.lines); });
   live.wire();
   // the first worker begins with the page, so that the first file does not wait for it

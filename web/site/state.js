@@ -141,9 +141,11 @@ const tell = {
     }, 1000);
     try {
       await work();
+      // what was being done is not said to the end of time
+      if (html("announced").textContent === html("doing").dataset.text) tell.announce("Done.");
     } catch (error) {
       if (error instanceof Cancelled) tell.cancelled();
-      else tell.wrong(error);
+      else tell.wrong(error), tell.announce("");
     } finally {
       window.clearInterval(crew.clock);
       html("busy").hidden = true;
@@ -209,16 +211,21 @@ const report = {
   open(of, name, title, text) {
     Object.assign(report, { of, name, text, opener: document.activeElement });
     const frame = part("page", HTMLIFrameElement);
-    frame.onload = () => {
-      // as long as what is in it: a phone has one thing to scroll
-      const inside = frame.contentDocument?.documentElement;
-      if (inside) frame.style.height = `${inside.scrollHeight + 4}px`;
-    };
+    frame.onload = report.fit;
     frame.srcdoc = text;
     frame.title = html("report-name").textContent = `Report: ${title}`;
     html("report").hidden = false;
     html("report").scrollIntoView();
     html("report-name").focus({ preventScroll: true });
+  },
+
+  /** Makes the frame as long as what is in it, at every width: a phone has one thing to scroll. */
+  fit() {
+    const frame = part("page", HTMLIFrameElement);
+    const inside = frame.contentDocument?.documentElement;
+    if (!inside || html("report").hidden) return;
+    frame.style.height = "0";
+    frame.style.height = `${inside.scrollHeight + 4}px`;
   },
 
   close() {

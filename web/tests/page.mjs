@@ -147,6 +147,11 @@ const stranger = async () => {
   await page.selectOption("#subject", "gauge");
   await press(page, "diagnose");
   check((await page.innerText("#sentence")).length > 20, "the gauge alone is diagnosed after it");
+  const own = `time_s,pos_mm,out_v\n${Array.from({ length: 400 }, (_, i) => `${i * 0.01},${160 + i % 40},${1.5 + (i % 40) / 100}`).join("\n")}\n`;
+  await put(page, [{ name: "own.csv", mimeType: "text/csv", buffer: Buffer.from(own) }]);
+  await until(page, () => document.querySelectorAll("#list tr").length === 1, null, 60_000);
+  await idle(page);
+  check(await page.inputValue("#reference") === "pos_mm", "an own recording with other columns replaces the sample");
   await page.context().close();
 };
 

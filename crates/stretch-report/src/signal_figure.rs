@@ -40,7 +40,7 @@ pub(crate) fn signal_figure(
     let legend = [
         (Ink::Low, "reference rises".to_owned()),
         (Ink::High, "reference falls".to_owned()),
-        (Ink::of(method), format!("estimate of {name}")),
+        (Ink::Text, format!("estimate of {name}")),
     ];
     let description =
         format!("Reference against {signal}, by direction, with the estimates of {name}");
@@ -49,7 +49,7 @@ pub(crate) fn signal_figure(
             // The dots come last, because the line would cover a narrow loop.
             for run in &estimates {
                 let points = sample_in_order(run, POINTS);
-                chart.draw_series(LineSeries::new(points, stroke(Ink::of(method).color(), 1.0)))?;
+                chart.draw_series(LineSeries::new(points, stroke(Ink::Text.color(), 1.0)))?;
             }
             for (points, ink) in [(&rising, Ink::Low), (&falling, Ink::High)] {
                 let dots = sample(points, DOTS).into_iter();

@@ -245,7 +245,7 @@ pub(crate) fn sentence(proposed: &Proposed, unit: &str) -> String {
             )
         }
         (false, true) => format!(
-            "What is left in {stage} depends on the recorded signals, but no short sum of terms describes how."
+            "What is left in {stage} may depend on the recorded signals, but no short sum of terms describes how. A random load looks like this as well."
         ),
         (false, false) => format!(
             "What is missing in {stage} may be {equation}: it closes {:.0} % of what is left there on trials that were not fitted.{}",

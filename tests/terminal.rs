@@ -157,10 +157,7 @@ fn quiet_says_results_and_errors_and_verbose_says_how() {
     // The sentence comes first, and at most fifteen lines follow. With -q, only the paths follow.
     let sentence = "On the same recordings as the fit, poly13 is off by";
     assert!(usual.starts_with(sentence) && usual.lines().count() <= 17, "{usual}");
-    assert!(
-        one_line(&usual).contains("it needs at least 8 movements"),
-        "{usual}"
-    );
+    assert!(one_line(&usual).contains("it needs at least 8 movements"), "{usual}");
     assert!(quiet.starts_with(sentence) && quiet.contains("\nwrote "), "{quiet}");
     assert!(!quiet.contains('|') && !quiet.contains("note:"), "{quiet}");
     let judged = |flags: &[&str]| {

@@ -85,7 +85,7 @@ pub(crate) fn turn_figure(subject: &Subject<'_>, stage: usize, shown: &Shown) ->
             for ((one, curve), x) in responses.parameters.iter().zip(&curves).zip(&spans) {
                 let (here, below) = rest.split_vertically(px(f64::from(PANEL)));
                 rest = below;
-                draw(&here, (one, &named(one, subject)), curve, [x, &y])?;
+                draw(&here, (one, &short(&named(one, subject))), curve, [x, &y])?;
             }
             Ok(())
         })
@@ -129,6 +129,20 @@ fn curves(responses: &Responses) -> Vec<Vec<(f64, f64)>> {
         curve
     };
     responses.parameters.iter().map(of).collect()
+}
+
+/// Number of characters of an effect's title that fit below a panel.
+const TITLE: usize = 36;
+
+/// Returns the name of a parameter with a shortened title of its effect, if the title is wider than a panel.
+fn short(name: &str) -> String {
+    match name.rsplit_once(": ") {
+        Some((title, parameter)) if title.chars().count() > TITLE => {
+            let title: String = title.chars().take(TITLE - 1).collect();
+            format!("{}…: {parameter}", title.trim_end())
+        }
+        _ => name.to_owned(),
+    }
 }
 
 fn named(one: &Response, subject: &Subject<'_>) -> String {

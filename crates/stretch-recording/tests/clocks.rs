@@ -480,3 +480,15 @@ proptest! {
         prop_assert!(trial.time_s.windows(2).all(|t| (t[1] - t[0] - 0.02).abs() < 1e-6));
     }
 }
+
+/// A file that holds two recordings names the row in which its time goes back, although rows before it are left out.
+#[test]
+fn time_that_begins_again_is_named_where_it_does() {
+    let first = (0..300).map(|n| 0.01 * f64::from(n));
+    let stamps = first.chain((0..1000).map(|n| 2.5 + 0.01 * f64::from(n)));
+    let rows: String = stamps.map(|time_s| format!("{time_s:.2},1\n")).collect();
+    let notes = read(&format!("time_s,bridge_v\n{rows}")).notes;
+    let named =
+        "row 302: time goes back from 2.99 to 2.5; 49 rows are left out, the first of them row 253";
+    assert!(notes.iter().any(|note| note.starts_with(named)), "{notes:?}");
+}

@@ -262,8 +262,12 @@ fn leave_out(
         };
         return Err(bad_stamps(&at, &format!("{evidence}: {why}")));
     }
-    notes.push(match count {
-        1 => format!("row {} is left out: {evidence}", at.row),
+    notes.push(match (count, goes_back(file, stamps)) {
+        (1, _) => format!("row {} is left out: {evidence}", at.row),
+        (_, Some((back, how))) => format!(
+            "row {}: {how}; {count} rows are left out, the first of them row {}; if the file holds two recordings, split it",
+            back.row, at.row
+        ),
         _ => format!("{count} rows are left out, the first of them row {}: {evidence}", at.row),
     });
     track.remove(rows);

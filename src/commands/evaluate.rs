@@ -140,17 +140,13 @@ fn array_doubts(
     let shifted = shifted.filter_map(|(method, _)| {
         let errors = evaluation.trials.iter().map(|trial| &trial.methods[method]);
         let worst = errors.max_by(|a, b| a.bias.abs().total_cmp(&b.bias.abs()))?;
-        Some(format!("{} by {}", worst.method, with_unit(worst.bias, &evaluation.unit)))
+        Some(format!("{} {}", worst.method, with_unit(worst.bias, &evaluation.unit)))
     });
     let shifted: Vec<String> = shifted.collect();
+    // A gauge whose own estimate is shifted may have been calibrated on too little to be used alone.
     if !shifted.is_empty() {
-        let text = format!(
-            "on average, the estimates of single gauges differ from the reference ({}); if a gauge was put on again, calibrate again",
-            shifted.join(", ")
-        );
-        // The gauges that have shifted explain the shift of all together.
-        all.retain(|doubt| doubt.code != SHIFTED);
-        all.push(Doubt { code: SHIFTED, text });
+        let alone = format!("; the estimates of single gauges are off by: {}", shifted.join(", "));
+        all.iter_mut().filter(|doubt| doubt.code == SHIFTED).for_each(|doubt| doubt.text += &alone);
     }
     all
 }

@@ -44,6 +44,10 @@ use crate::display::warn;
 /// calibration file, and the largest difference is reported: it shows whether the board
 /// runs this calibration. The file may be a calibration of any model, or the file that
 /// `stretch export --fixed` wrote for the board, which contains neither names nor units.
+///
+/// A model with memory (an observer, for example) is compared only while every frame since the start
+/// of the board arrives: after a lost frame, and if the board ran already, its memory differs from that
+/// of this computer. Reset the board while `stretch listen` runs to compare from its first frame on.
 #[derive(clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {

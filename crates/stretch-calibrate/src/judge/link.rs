@@ -3,7 +3,7 @@
 
 use std::io::Write;
 
-use stretch_core::{Branch, Calibration, RateEstimator, Runner, Target, Volts};
+use stretch_core::{Branch, Calibration, Model, RateEstimator, Runner, Target, Volts};
 use stretch_data::push_number;
 use stretch_link::{Answer, Counts, Decoder, Event, Frame, TimeLine};
 use stretch_receptor::{
@@ -27,6 +27,8 @@ pub struct Twin {
     period_s: Option<f64>,
     /// The target, if the calibration states it.
     target: Option<Target>,
+    /// Whether an estimate depends on all samples since the board's start.
+    remembers: bool,
     receptor: Own,
 }
 
@@ -42,12 +44,20 @@ impl Twin {
     /// No calibration: nothing is compared.
     pub fn none() -> Self {
         let (signal, receptor) = ("signal".to_owned(), Own::Silent);
-        Self { signal, unit: String::new(), period_s: None, target: None, receptor }
+        Self {
+            signal,
+            unit: String::new(),
+            period_s: None,
+            target: None,
+            remembers: false,
+            receptor,
+        }
     }
 
     /// A calibration for a board's converter, which states neither names nor units.
     pub fn of_board(receptor: BoardReceptor) -> Self {
-        Self { receptor: Own::Codes(Box::new(receptor)), ..Self::none() }
+        let remembers = receptor.remembers();
+        Self { remembers, receptor: Own::Codes(Box::new(receptor)), ..Self::none() }
     }
 
     /// A calibration. One whose rate estimator needs the next sample has no live estimates.
@@ -66,6 +76,7 @@ impl Twin {
             unit: spec.reference.unit().to_owned(),
             period_s: Some(spec.sample_rate_hz.period_s()),
             target: Some(spec.target),
+            remembers: !matches!(spec.model, Model::Linear(_) | Model::Surfaces { .. }),
             receptor,
         })
     }
@@ -157,6 +168,8 @@ pub struct LinkStatus {
     /// Number of the board's estimates that were compared with those computed here, and the largest
     /// difference; `None` if the calibration has no live estimates.
     compared: Option<(u64, f64)>,
+    /// Number of frames that were not compared, because board and computer do not remember the same samples.
+    apart: u64,
     unit: String,
     /// The board's latest estimate.
     newest: Option<f64>,
@@ -217,14 +230,24 @@ impl LinkStatus {
         }
         match self.compared {
             Some((0, _)) if frames > 0 => text += "; no estimate was compared with the calibration",
-            Some((_, difference)) if frames > 0 => {
+            Some((compared, difference)) if frames > 0 => {
                 text += format!(
                     "; the estimates differ from the calibration by up to {difference:.4} {}",
                     self.unit
                 )
                 .trim_end();
+                if self.apart > 0 {
+                    text += &format!(" in {compared} of {frames} frames");
+                }
             }
             _ => {}
+        }
+        if self.apart > 0 {
+            text += &format!(
+                "; {} frames are not compared, because the model remembers earlier samples, of which some did not arrive \
+                 here; reset the board to compare from its first frame on",
+                self.apart
+            );
         }
         if !self.connected {
             text += "; waiting for the port";
@@ -252,6 +275,8 @@ pub struct Link {
     time_line: TimeLine,
     adc: Adc,
     twin: Twin,
+    /// Whether every sample since the board's start arrived.
+    is_whole: bool,
     /// Its state.
     pub status: LinkStatus,
 }
@@ -266,7 +291,7 @@ impl Link {
             ..LinkStatus::default()
         };
         let time_line = TimeLine::new(twin.period_s.unwrap_or(TICK_S));
-        Self { decoder: Decoder::new(), time_line, adc, twin, status }
+        Self { decoder: Decoder::new(), time_line, adc, twin, is_whole: false, status }
     }
 
     /// The header of the lines of its samples.
@@ -297,11 +322,13 @@ impl Link {
 
     fn sample(&mut self, event: Event, now_s: f64) -> Option<LinkSample> {
         let frame = event.frame()?;
-        if !matches!(event, Event::Frame(_)) {
-            // The board has seen samples that did not arrive here, or has restarted. The estimates
-            // of board and computer agree again once the window of the rate filter is filled.
+        let goes_on = matches!(event, Event::Frame(_));
+        if !goes_on {
+            // The board has seen samples that did not arrive here, or has restarted. Without further
+            // memory, board and computer agree again once the window of the rate filter is filled.
             self.twin.reset();
         }
+        self.is_whole = frame.counter == 0 || (goes_on && self.is_whole);
         let time_s = self.time_line.time_s(&event, now_s);
         let sample =
             LinkSample::new(time_s.unwrap_or(f64::NAN), frame, &self.adc, self.twin.target);
@@ -310,6 +337,7 @@ impl Link {
             code if sample.signal.is_none() => {
                 self.status.beyond += 1;
                 self.status.largest = self.status.largest.max(code);
+                self.is_whole = false;
             }
             _ => {}
         }
@@ -320,9 +348,14 @@ impl Link {
         time_s.map(|_| sample)
     }
 
-    /// Compares the estimates of board and computer, if both have one on the same branch.
+    /// Compares the estimates of board and computer, if both have one on the same branch, and remember the same
+    /// samples.
     fn compare(&mut self, sample: &LinkSample) {
         let ours = self.twin.step(AdcCode(sample.frame.code), sample.signal);
+        if self.twin.remembers && !self.is_whole {
+            self.status.apart += 1;
+            return;
+        }
         let (Some((ours, own)), Answer::Reading { branch, .. }) = (ours, sample.frame.answer)
         else {
             return;
@@ -332,5 +365,67 @@ impl Link {
             let compared = self.status.compared.map(|(n, most)| (n + 1, most.max(difference)));
             self.status.compared = compared;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{fixed_record, parse_adc};
+    use stretch_receptor::{example_calibration, example_observer};
+
+    fn receptor(calibration: &Calibration) -> BoardReceptor {
+        let record = fixed_record(calibration, &parse_adc("12,0,3.3").unwrap()).unwrap();
+        BoardReceptor::new(&record.bytes).unwrap()
+    }
+
+    /// The frames of a board from its start.
+    fn frames(calibration: &Calibration) -> Vec<Frame> {
+        let mut board = receptor(calibration);
+        let frame = |counter| {
+            let code = 1900 + (500.0 * (f64::from(counter) * 0.03).sin()) as i32;
+            let answer = board.step(AdcCode(code)).into();
+            Frame { counter, time_ms: 10 * counter, code, answer }
+        };
+        (0..400).map(frame).collect()
+    }
+
+    fn status<'a>(twin: Twin, frames: impl IntoIterator<Item = &'a Frame>) -> String {
+        let mut link = Link::new(twin, parse_adc("12,0,3.3").unwrap());
+        link.status.connected = true;
+        for frame in frames {
+            link.take(frame.encode(&mut [0; Frame::LONGEST]), 0.0);
+        }
+        link.status.line()
+    }
+
+    #[test]
+    fn a_model_that_remembers_is_compared_while_every_sample_since_the_start_arrives() {
+        let observer = example_observer();
+        let frames = frames(&observer);
+        let all = || frames.iter();
+        let own = || Twin::of_board(receptor(&observer));
+        let equal = "the estimates differ from the calibration by up to 0.0000";
+        assert!(status(own(), all()).ends_with(equal));
+        assert!(!status(Twin::new(&observer).unwrap(), all()).contains("not compared"));
+        for twin in [own(), Twin::new(&observer).unwrap()] {
+            let late = status(twin, all().skip(50));
+            let none = "no estimate was compared with the calibration; 350 frames are not compared";
+            assert!(late.contains(none), "{late}");
+        }
+        let lost = status(own(), all().take(300).chain(all().skip(301)));
+        let expected = format!("{equal} in 300 of 399 frames; 99 frames are not compared");
+        assert!(lost.contains(&expected), "{lost}");
+        let again = status(own(), all().skip(150).chain(all().take(200)));
+        let expected = format!("{equal} in 200 of 450 frames; 250 frames are not compared");
+        assert!(again.contains(&expected), "{again}");
+    }
+
+    #[test]
+    fn a_model_with_a_window_is_compared_again_after_a_loss() {
+        let frames = frames(&example_calibration());
+        let twin = Twin::of_board(receptor(&example_calibration()));
+        let lost = status(twin, frames[20..200].iter().chain(&frames[201..]));
+        assert!(lost.ends_with("differ from the calibration by up to 0.0000"), "{lost}");
     }
 }

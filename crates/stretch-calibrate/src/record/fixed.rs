@@ -280,7 +280,7 @@ fn made<T: Serialize>(
 /// let adc = parse_adc("12,0,3.3")?;
 /// let record = fixed_record(&stretch_receptor::example_observer(), &adc)?;
 /// let mut receptor = BoardReceptor::new(&record.bytes).expect("one of those files");
-/// assert_eq!(receptor.adc_bits(), 12);
+/// assert_eq!((receptor.adc_bits(), receptor.remembers()), (12, true));
 /// assert!(receptor.step(AdcCode(1861)).is_ok());
 /// assert!(BoardReceptor::new(b"anything else").is_none());
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -288,6 +288,7 @@ fn made<T: Serialize>(
 #[derive(Debug)]
 pub struct BoardReceptor {
     adc_bits: u8,
+    remembers: bool,
     running: Box<dyn Running>,
 }
 
@@ -298,7 +299,7 @@ impl BoardReceptor {
         rated_receptor(bytes).or_else(|| {
             let observer: FixedObserver = record::load(bytes).ok()?;
             let adc_bits = observer.adc_bits();
-            Some(Self { adc_bits, running: Box::new(Runner::new(observer)) })
+            Some(Self { adc_bits, remembers: true, running: Box::new(Runner::new(observer)) })
         })
     }
 
@@ -310,6 +311,11 @@ impl BoardReceptor {
     /// Returns the number of bits of the converter for which the calibration was made.
     pub fn adc_bits(&self) -> u8 {
         self.adc_bits
+    }
+
+    /// Returns whether an estimate depends on all earlier codes, as that of an observer does.
+    pub fn remembers(&self) -> bool {
+        self.remembers
     }
 
     /// Processes the next code. Estimates are in thousandths of the reference's unit.
@@ -331,7 +337,7 @@ fn surface_receptor<const WINDOW: usize, const DEGREE: usize>(
 ) -> Option<BoardReceptor> {
     let fixed: FixedCalibration<WINDOW, DEGREE> = record::load(bytes).ok()?;
     let running = Box::new(Runner::new(FixedReceptor::new(fixed)));
-    Some(BoardReceptor { adc_bits: fixed.adc_bits(), running })
+    Some(BoardReceptor { adc_bits: fixed.adc_bits(), remembers: false, running })
 }
 
 /// A receptor of any type that takes converter codes, as a trait object.

@@ -1,7 +1,9 @@
 //! Tests of the resolution of estimates in integers, and of sample periods.
 
 use stretch_calibrate::{CalibrateError, fixed_record, parse_adc, read_calibration};
-use stretch_core::{Calibration, CalibrationSpec, Label, SampleRate, Target};
+use stretch_core::{
+    Calibration, CalibrationSpec, Degree, Label, Model, SampleRate, Surface, Target,
+};
 use stretch_export::{ExportError, Form, Options, arduino_library, header};
 use stretch_receptor::example_observer;
 
@@ -55,6 +57,28 @@ fn integers_state_their_step_and_are_refused_where_it_exceeds_the_error_of_the_f
         assert!(fixed.notes.is_empty() && fixed.text.contains("#define STRETCH_LAST_CODE"));
         assert!(!float.text.contains("STRETCH_LAST_CODE"), "a program for codes compiles in float");
         assert!(float.text.contains("A step takes the signal, not a code: STRETCH_ADC_ZERO"));
+    }
+}
+
+/// In integers a curve would wait for the window of a rate that it does not use.
+#[test]
+fn a_curve_of_any_degree_is_exported_in_float_under_its_name() {
+    for coefficients in [[0.02, 0.8, 0.3].as_slice(), &[0.02, 0.8, 0.3, -0.1, 0.05, -0.04]] {
+        let calibration = changed(in_millimetres().nth(1).unwrap(), |spec| {
+            let Model::Surfaces { inflation, deflation } = &mut spec.model else {
+                panic!("poly13")
+            };
+            let degree = Degree::new(0, coefficients.len() as u8 - 1).unwrap();
+            inflation.surface = Surface::new(degree, coefficients).unwrap();
+            *deflation = *inflation;
+        });
+        let error = header(&calibration, &options(Some(Form::Fixed))).unwrap_err().to_string();
+        for part in ["the curve model has no integer form", "--form float"] {
+            assert!(error.contains(part), "{part}: {error}");
+        }
+        let float = header(&calibration, &options(None)).unwrap();
+        assert_eq!((float.form, float.model.as_str()), (Form::Float, "curve"));
+        assert!(float.notes[0].contains("because the curve model has no"), "{:?}", float.notes);
     }
 }
 

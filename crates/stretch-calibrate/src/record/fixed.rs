@@ -48,7 +48,7 @@ pub struct FixedRecord {
 
 /// Returns a calibration in integers. Its inputs are codes of `adc`, its outputs thousandths of the reference's unit.
 ///
-/// Linear models and surfaces with no term beyond poly13 become a
+/// Linear models and surfaces with no term beyond poly13 that depend on the rate become a
 /// [`FixedCalibration`], observers a [`FixedObserver`].
 ///
 /// # Errors
@@ -88,6 +88,8 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
     };
     match &calibration.spec().model {
         Model::Linear(_) | Model::Observer(_) => {}
+        // in integers it would wait for the window of a rate that it does not use
+        curve if curve.needs_signal_only() => return none("the curve model"),
         Model::Surfaces { inflation, deflation } => {
             let mut branches = [inflation, deflation].into_iter();
             if let Some(branch) = branches.find(|b| b.surface.as_poly13().is_none()) {

@@ -141,6 +141,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
         )
         .word("SIGNAL_RISES", rising, "the branch of a rising signal")
         .word("SIGNAL_FALLS", falling, "");
+    let is_static = calibration.spec().model.needs_signal_only();
     let (name, surface) = match model.map() {
         Map::Line(line) => {
             let Line { signal, offset, slope, intercept } = line;
@@ -154,9 +155,9 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
         }
         Map::Poly13([inflation, deflation]) => {
             constants.surfaces(&[poly13_float(inflation), poly13_float(deflation)]);
-            ("poly13", include_str!("../c/poly13_float.h"))
+            (if is_static { "curve" } else { "poly13" }, include_str!("../c/poly13_float.h"))
         }
-        Map::Surface([curve, _]) if calibration.spec().model.needs_signal_only() => {
+        Map::Surface([curve, _]) if is_static => {
             let degree = curve.surface.degree();
             let coefficients = curve.surface.coefficients();
             constants
@@ -181,7 +182,7 @@ pub(crate) fn surfaces_float(calibration: &Calibration) -> Result<Part, ExportEr
             surface,
             include_str!("../c/surfaces_float_step.h"),
         ],
-        has: vec![if calibration.spec().model.needs_signal_only() { "static" } else { "moving" }],
+        has: vec![if is_static { "static" } else { "moving" }],
     })
 }
 

@@ -245,6 +245,11 @@ fn a_signal_in_counts_needs_a_converter_in_counts_in_every_form() {
             fails(&mut command, &["signal a0", "unit of the signal column", "10,0,1023"]);
         }
     }
+    for form in ["fixed", "float"] {
+        let mut command = export(&calibration, &out);
+        command.args(["--form", form, "--adc", "8,0,255"]);
+        fails(&mut command, &["signal a0", "measures from 0 to 255", "give --adc 10,0,1023"]);
+    }
     for (adc, parts) in [
         ("10,0,1023", [].as_slice()),
         ("10,0,300", &["range of a0 is from 2", "measures from 0 to 300", "only a part"]),

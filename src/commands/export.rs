@@ -112,13 +112,14 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             SleeveCalibration::Many(several) => array_header(several, &options),
         };
         let made = made.with_context(named)?;
+        let notes = notes(&made).with_context(named)?;
         let files = stage(&mut outputs, out, &made, args.arduino)?;
-        anyhow::Ok((out, made, files))
+        anyhow::Ok((out, made, files, notes))
     });
     let c = c.transpose()?;
     outputs.keep()?;
     let record = fixed.as_ref().and_then(|(_, record)| record.note.clone());
-    let header = c.as_ref().map_or(Vec::new(), |(_, made, _)| notes(made));
+    let header = c.iter().flat_map(|(_, _, _, notes)| notes.clone());
     let all: BTreeSet<String> = record.into_iter().chain(header).collect();
     all.iter().for_each(|note| warn(format!("note: {note}")));
     if let Some((path, FixedRecord { bytes, read_as, .. })) = &fixed {
@@ -128,19 +129,25 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         ))?;
     }
     match &c {
-        Some((out, made, files)) if !is_standard_output(out) => explain(out, made, files),
+        Some((out, made, files, _)) if !is_standard_output(out) => explain(out, made, files),
         _ => Ok(()),
     }
 }
 
 /// Returns what to know about the converter of a header. A step in `float` takes the signal itself, so that a header
 /// for another converter can be used without its constants.
-fn notes(made: &Header) -> Vec<String> {
-    let mut notes = made.converter_notes().unwrap_or_else(|error| {
-        vec![format!("{error}; otherwise do not use STRETCH_ADC_ZERO and STRETCH_ADC_PER_CODE")]
-    });
+///
+/// # Errors
+/// A converter in counts that does not have the counts of the signal.
+fn notes(made: &Header) -> anyhow::Result<Vec<String>> {
+    let mut notes = match made.converter_notes() {
+        Err(error) if !made.adc.is_in_counts() => {
+            vec![format!("{error}; otherwise do not use STRETCH_ADC_ZERO and STRETCH_ADC_PER_CODE")]
+        }
+        notes => notes?,
+    };
     notes.extend_from_slice(&made.notes);
-    notes
+    Ok(notes)
 }
 
 /// Describes a calibration file and the state of its checksum, after renewing the checksum if

@@ -55,7 +55,8 @@ pub struct FixedRecord {
 /// [`CalibrateError::Refused`] for a converter of more than 16 bits, [`CalibrateError::NoFixedForm`] for any other
 /// model, for a rate estimator for which no type was compiled (an observer needs none), if a step of an estimate
 /// ([`FIXED_STEP`]) exceeds the fit's error, and if the reference in such steps exceeds 32 bits,
-/// [`CalibrateError::OutsideConverter`] if all of the trials' signal lies outside the converter, and
+/// [`CalibrateError::OutsideConverter`] as [`converter_reach`], and for an observer whose numbers do not fit because the
+/// converter does not measure its whole range, and
 /// [`CalibrateError::Fixed`] if a number does not fit its format.
 ///
 /// ```
@@ -116,7 +117,11 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
     if !matches!(calibration.spec().model, Model::Observer(_)) {
         return Ok(FixedRecord { note, ..rated(calibration, adc)? });
     }
-    let fixed = FixedObserver::new(calibration, adc).map_err(CalibrateError::Fixed)?;
+    let fixed = FixedObserver::new(calibration, adc).map_err(|error| match &note {
+        // an observer needs the whole range
+        Some(note) => CalibrateError::OutsideConverter(note.clone()),
+        None => CalibrateError::Fixed(error),
+    })?;
     let made = made("FixedObserver".into(), &fixed, RecordNumbers::Observer(*fixed.model()))?;
     Ok(FixedRecord { note, ..made })
 }
@@ -125,7 +130,8 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
 /// measures only a part of it, or measures it in few codes.
 ///
 /// # Errors
-/// [`CalibrateError::OutsideConverter`] if the converter measures no part of it, or measures it in less than two codes.
+/// [`CalibrateError::OutsideConverter`] if the converter measures no part of it, or measures it in less than two codes,
+/// or if the converter and the signal are in counts and the signal exceeds the codes of the converter.
 ///
 /// ```
 /// use stretch_calibrate::{converter_reach, parse_adc};
@@ -137,6 +143,7 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
 /// assert!(reach("10,0,400")?.is_some_and(|note| note.contains("is from 193 to 456")));
 /// assert!(reach("10,0,1000000").unwrap_err().to_string().contains("only 0.3 codes"));
 /// assert!(reach("10,0,5").unwrap_err().to_string().contains("--adc"));
+/// assert!(reach("8,0,255").unwrap_err().to_string().contains("--adc 10,0,1023"));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub fn converter_reach(
@@ -147,21 +154,27 @@ pub fn converter_reach(
     let Interval { min, max } = range;
     let AdcSpec { zero_v, full_scale_v, .. } = adc.spec();
     let codes = (max - min) / adc.volts_per_code();
-    let is_outside = max < zero_v || full_scale_v < min;
+    // a hundredth of the range is not worth a note
+    let beyond = (zero_v - min).max(max - full_scale_v) > 0.01 * (max - min);
+    // A converter cannot have given counts that it does not have.
+    let is_outside = max < zero_v || full_scale_v < min || (beyond && adc.is_in_counts());
     if is_outside || codes < LEAST_CODES {
         let few = match is_outside {
             true => String::new(),
             false => format!(", in which the signal has only {codes:.1} codes"),
         };
+        let counts = COMMON_BITS.into_iter().find(|bits| max < f64::from(1u32 << bits));
+        let advice = counts.filter(|_| adc.is_in_counts() && min >= 0.0).map_or_else(
+            || GIVE_ADC.to_owned(),
+            |bits| format!("for counts of {bits} bits give --adc {bits},0,{}", (1u32 << bits) - 1),
+        );
         return Err(CalibrateError::OutsideConverter(format!(
             "the signal {signal} of the trials is between {} and {}, but the converter measures from {zero_v} to {full_scale_v}{few}: this is not \
-             the board's converter; {GIVE_ADC}",
+             the board's converter; {advice}",
             in_digits(min, 4),
             in_digits(max, 4)
         )));
     }
-    // a hundredth of the range is not worth a note
-    let beyond = (zero_v - min).max(max - full_scale_v) > 0.01 * (max - min);
     let what = match (beyond, codes < FEW_CODES) {
         (true, _) => "so that it measures only a part of that range".to_owned(),
         (false, true) => format!("so that the range has only {codes:.1} codes"),
@@ -180,6 +193,9 @@ const FEW_CODES: f64 = 16.0;
 
 /// A converter that measures the calibrated range in fewer codes than this is in another unit than the signal.
 const LEAST_CODES: f64 = 2.0;
+
+/// Resolutions of converters, in bits.
+const COMMON_BITS: [u8; 6] = [8, 10, 12, 14, 16, 24];
 
 /// What to do about a converter that does not fit the signal.
 const GIVE_ADC: &str = "give it with --adc BITS,ZERO,FULL_SCALE in the unit of the signal column, \

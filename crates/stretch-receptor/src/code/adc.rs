@@ -37,7 +37,7 @@ pub const FIXED_BITS: u8 = 16;
 /// let adc = Adc::new(AdcSpec { bits: 12, zero_v: 0.0, full_scale_v: 3.3 })?;
 /// assert_eq!(adc.volts(AdcCode(4095)), Some(3.3));
 /// assert_eq!(adc.volts(AdcCode(4096)), None);
-/// assert_eq!(adc.code(1.65), AdcCode(2048));
+/// assert_eq!((adc.code(1.65), adc.is_in_counts()), (AdcCode(2048), false));
 /// # Ok::<(), stretch_receptor::ReceptorError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,6 +86,11 @@ impl Adc {
     /// Voltage of one code step (LSB).
     pub fn volts_per_code(&self) -> f64 {
         (self.0.full_scale_v - self.0.zero_v) / f64::from(self.largest())
+    }
+
+    /// Returns whether the converter's range is in its own codes, so that a code is the signal itself.
+    pub fn is_in_counts(&self) -> bool {
+        (self.volts_per_code() - 1.0).abs() < 1e-9
     }
 
     /// Volts of a code; `None` for a code that the converter does not have.

@@ -304,7 +304,7 @@ fn assembled(
     let Part { model, constants, step, has } = part;
     let pressure = has.contains(&"crosstalk");
     let has_branches = !has.contains(&"array");
-    let mut text = opening(&source, form, &model, &has) + &frame(&source, options);
+    let mut text = opening(&source, form, &model, &has) + &frame(&source, form, options);
     text += "\n";
     if !step.iter().any(|part| part.contains("STRETCH_CAN_LOAD")) {
         text += include_str!("c/no_load.h");
@@ -384,7 +384,7 @@ fn opening(source: &Source<'_>, form: Form, model: &str, has: &[&str]) -> String
 }
 
 /// Returns the constants that a program needs to call the step.
-fn frame(source: &Source<'_>, options: &Options) -> String {
+fn frame(source: &Source<'_>, form: Form, options: &Options) -> String {
     let spec = options.adc.spec();
     let unit = comment_safe(source.reference.unit());
     let period_s = source.sample_rate.period_s();
@@ -406,5 +406,41 @@ fn frame(source: &Source<'_>, options: &Options) -> String {
         .define("ADC_BITS", i32::from(spec.bits), "of the board's converter")
         .define("ADC_ZERO", spec.zero_v as f32, "the signal at code 0")
         .define("ADC_PER_CODE", options.adc.volts_per_code() as f32, "signal per code");
+    if let (Form::Fixed, [(_, range)]) = (form, &source.signals[..]) {
+        let [lowest, highest] = measured_codes(*range, &options.adc);
+        constants
+            .define("LOWEST_CODE", lowest, "calibrated range with a tenth of it on either side")
+            .define("HIGHEST_CODE", highest, "");
+    }
     constants.into_text()
+}
+
+/// Returns the lowest and the highest code of the calibrated range with a margin of a tenth of the range on either side.
+/// The first and the last code of the converter are excluded, unless the range itself reaches them.
+fn measured_codes(range: Interval, adc: &Adc) -> [i32; 2] {
+    let margin = 0.1 * (range.max - range.min);
+    let code = |signal| adc.code(signal).0;
+    let lowest = code(range.min - margin).max(code(range.min).min(1));
+    let last = adc.largest();
+    [lowest, code(range.max + margin).min(code(range.max).max(last - 1))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use stretch_calibrate::parse_adc;
+
+    #[test]
+    fn the_codes_of_a_range_have_a_margin_and_exclude_the_ends_of_the_converter() {
+        for (adc, codes) in [
+            ("12,0,4.095", [900, 2100]),
+            ("12,0.95,4.095", [1, 1497]),
+            ("12,1,3.3", [0, 1958]),
+            ("10,0,2.05", [449, 1022]),
+            ("10,0,2", [460, 1023]),
+        ] {
+            let range = Interval { min: 1.0, max: 2.0 };
+            assert_eq!(measured_codes(range, &parse_adc(adc).unwrap()), codes, "{adc}");
+        }
+    }
 }

@@ -52,9 +52,9 @@ void loop() {
   due_us += STRETCH_PERIOD_US;
 @if one
   int32_t code = analogRead(A0);
-  // the first and the last code also come from a loose wire or from a signal beyond the converter
-  bool is_measured = code > 0 && code < (1L << STRETCH_ADC_BITS) - 1;
 @if fixed
+  // a code outside the calibrated range and its margin comes from a loose wire or another fault
+  bool is_measured = code >= STRETCH_LOWEST_CODE && code <= STRETCH_HIGHEST_CODE;
   stretch_reading reading = is_measured ? stretch_step(&state, code) : stretch_lost(&state);
 @end
 @if pressure
@@ -62,6 +62,8 @@ void loop() {
   stretch_set_pressure(&state, pressure);
 @end
 @if float
+  // the first and the last code also come from a loose wire or from a signal beyond the converter
+  bool is_measured = code > 0 && code < (1L << STRETCH_ADC_BITS) - 1;
   float sample = STRETCH_ADC_ZERO + STRETCH_ADC_PER_CODE * (float)code;
   stretch_reading reading = is_measured ? stretch_step(&state, sample) : stretch_lost(&state);
 @end

@@ -2,7 +2,8 @@
 #define STRETCH_NO_CODE (-1)
 
 /* The first code, 0, and the last code also come from a loose wire or from a signal beyond the
- * converter. Call stretch_lost for them, unless the calibrated range reaches them. */
+ * converter. Call stretch_lost for them, unless the calibrated range reaches them. On a noisy
+ * supply, call it for every code below STRETCH_LOWEST_CODE or above STRETCH_HIGHEST_CODE. */
 #define STRETCH_LAST_CODE ((1L << STRETCH_ADC_BITS) - 1)
 
 /* Shifts of negative numbers must keep the sign, as on every known compiler for a board. */

@@ -55,6 +55,8 @@ fn a_header_of_every_model_passes_its_self_test() {
         let out = scratch.path("c");
         let said = runs(export(&calibration, &out).args(["--form", form]));
         assert!(said.contains(says) && said.contains("200 samples"), "{said}");
+        let per_code = said.contains("one code changes the estimate by 0.0");
+        assert_eq!(per_code, form == "fixed", "{said}");
         passes_its_self_test(&scratch, &out);
     }
 }
@@ -266,6 +268,8 @@ fn a_signal_in_counts_needs_a_converter_in_counts_in_every_form() {
 fn a_folder_that_exists_and_a_newer_record_are_refused() {
     let scratch = Scratch::new();
     let calibration = calibrated(&scratch, &["--model", "linear"]);
+    let note = warned(&mut export(&calibration, &scratch.path("out.h")));
+    assert!(note.contains("out.h is a folder") && note.contains("--c - > "), "{note}");
     let out = scratch.path("c");
     fs::create_dir(&out).unwrap();
     fs::write(out.join("stretch.h"), "mine").unwrap();

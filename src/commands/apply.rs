@@ -23,12 +23,14 @@ use crate::display::{Output, detail, doubt, warn};
 /// Turn the voltages of a trial or of a live stream into lengths
 ///
 /// Writes time_s, the estimate, its rate, the branch and the domain, one line per
-/// sample. If there is no estimate (the rate estimator warms up, a sample is
-/// missing), the numbers are empty and the column domain gives the reason. A row whose
-/// signal is empty or nan is left out, with a note. Inputs outside the calibrated
+/// sample. While the rate estimator warms up, at the start and after a gap, the numbers
+/// are empty and the column domain is "warming". A row whose signal is empty or nan gives
+/// no line: in a file a note counts such rows, from standard input a message names each.
+/// They and rows that are absent count as missing samples. Inputs outside the calibrated
 /// domain are clamped, and the column domain shows it. The models linear and curve
 /// need no rate: they give estimates from the first sample on, with an empty rate at
-/// first.
+/// first. An observer has no warm-up either, but its estimates settle within about a
+/// second after a start or a long gap.
 ///
 /// From standard input each line gets its estimate immediately; a malformed line is
 /// reported on standard error and skipped:

@@ -8,8 +8,12 @@ use std::{
 
 use anyhow::{Context, anyhow, bail, ensure};
 use clap::ArgGroup;
-use stretch_calibrate::{FIXED_STEP, FixedRecord, fixed_record, parse_adc};
-use stretch_data::files::{FileError, Outputs, is_standard_output, write_whole};
+use stretch_calibrate::{FIXED_STEP, FixedRecord, change_per_code, fixed_record, parse_adc};
+use stretch_core::Calibration;
+use stretch_data::{
+    files::{FileError, Outputs, is_standard_output, write_whole},
+    in_digits,
+};
 use stretch_export::{
     File, Form, HEADER, Header, Options, SELF_TEST_SAMPLES, arduino_library, array_header,
     gauge_header,
@@ -25,7 +29,8 @@ use crate::display::warn;
 /// In C it is one C99 header that also compiles as C++: the calibration as constants, stretch_init(),
 /// stretch_step() for a sample, stretch_lost() for a missing sample, and stretch_self_test(), which
 /// runs 200 samples and compares the estimates with those of the computer. It needs no allocation and
-/// no library, and gives the same bits as the Rust receptor of the same form.
+/// no library, and gives the same bits as the Rust receptor of the same form. An observer has no
+/// warm-up, but its estimates settle within about a second after a start or a long gap.
 ///
 ///   stretch export --calibration cal.json --c Elbow --arduino
 ///
@@ -48,7 +53,7 @@ pub(crate) struct Args {
     /// Calibration file from `stretch calibrate`
     #[arg(long, value_name = "cal.json")]
     calibration: PathBuf,
-    /// Folder for the header, new or empty; - writes the header to standard output
+    /// Folder for the header stretch.h, new or empty; - writes the header to standard output
     #[arg(long, value_name = "DIR")]
     c: Option<PathBuf>,
     /// Make the folder an Arduino library with the folder's name
@@ -122,16 +127,29 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let header = c.iter().flat_map(|(_, _, _, notes)| notes.clone());
     let all: BTreeSet<String> = record.into_iter().chain(header).collect();
     all.iter().for_each(|note| warn(format!("note: {note}")));
+    let per_code = match &calibration {
+        SleeveCalibration::One(one) => per_code(one.calibration(), &args.adc),
+        SleeveCalibration::Many(_) => String::new(),
+    };
     if let Some((path, FixedRecord { bytes, read_as, .. })) = &fixed {
         let (out, count) = (path.display(), bytes.len());
         tell(format!(
-            "wrote {out}: {count} bytes, a board reads it as {read_as}; an estimate has steps of {FIXED_STEP} in the reference's unit"
+            "wrote {out}: {count} bytes, a board reads it as {read_as}; an estimate has steps of {FIXED_STEP} in the reference's unit{per_code}"
         ))?;
     }
     match &c {
-        Some((out, made, files, _)) if !is_standard_output(out) => explain(out, made, files),
+        Some((out, made, files, _)) if !is_standard_output(out) => {
+            explain(out, made, &per_code, files)
+        }
         _ => Ok(()),
     }
+}
+
+/// Returns the mean change of the estimate per code, in brackets.
+fn per_code(calibration: &Calibration, adc: &Adc) -> String {
+    let change = in_digits(change_per_code(calibration, adc), 2);
+    let change = format!("{change} {}", calibration.spec().reference.unit());
+    format!(" (one code changes the estimate by {} on average)", change.trim_end())
 }
 
 /// Returns what to know about the converter of a header. A step in `float` takes the signal itself, so that a header
@@ -203,11 +221,17 @@ fn stage(
     Ok(files)
 }
 
-fn explain(out: &Path, made: &Header, files: &[File]) -> anyhow::Result<()> {
+fn explain(out: &Path, made: &Header, per_code: &str, files: &[File]) -> anyhow::Result<()> {
+    if out.extension().is_some_and(|extension| extension == "h") {
+        warn(format!(
+            "note: {0} is a folder; --c - > {0} writes the header to a file",
+            out.display()
+        ));
+    }
     let (out, Header { form, model, pressure, step, adc, .. }) = (out.display(), made);
     let AdcSpec { bits, zero_v, full_scale_v } = adc.spec();
     let step = step.as_ref().map_or_else(String::new, |step| {
-        format!(", in steps of {step}, for codes of --adc {bits},{zero_v},{full_scale_v}")
+        format!(", in steps of {step}, for codes of --adc {bits},{zero_v},{full_scale_v}{per_code}")
     });
     tell(format!(
         "wrote {out}: {model}, {form}{step}, a self-test of {SELF_TEST_SAMPLES} samples"

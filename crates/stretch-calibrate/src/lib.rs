@@ -28,8 +28,8 @@ pub use prepare::{MOST_ROWS, Rated, RatedPart, rated, without_gross_errors};
 pub use record::{
     BoardReceptor, FIXED_STEP, FixedRecord, RecordNumbers, calibration_bytes,
     calibration_from_edited_json, calibration_from_json, calibration_seal, calibration_to_json,
-    converter_reach, digest, fit_error, fixed_record, is_postcard, parse_adc, read_calibration,
-    write_calibration,
+    change_per_code, converter_reach, digest, fit_error, fixed_record, is_postcard, parse_adc,
+    read_calibration, write_calibration,
 };
 
 /// Parts from which other crates build their own calibrations.

@@ -222,6 +222,20 @@ fn span(calibration: &Calibration) -> f64 {
     (spec.target.to_reference(high) - spec.target.to_reference(low)).abs()
 }
 
+/// Returns the mean change of the estimate per code of a converter, over the calibrated range, in the unit of the
+/// reference: `span of the reference / codes in the range of the signal`.
+///
+/// ```
+/// use stretch_calibrate::{change_per_code, parse_adc};
+/// let per_code = change_per_code(&stretch_receptor::example_calibration(), &parse_adc("12,0,3.3")?);
+/// assert!((0.02..0.03).contains(&per_code), "29.7 mm for a volt: {per_code}");
+/// # Ok::<(), stretch_calibrate::SpellingError>(())
+/// ```
+pub fn change_per_code(calibration: &Calibration, adc: &Adc) -> f64 {
+    let range = calibration.spec().signal_range;
+    span(calibration) * adc.volts_per_code() / (range.max() - range.min())
+}
+
 /// The window of a rate estimator is part of a type, so only the windows listed below are compiled in.
 macro_rules! windows {
     ($($window:literal)*) => {

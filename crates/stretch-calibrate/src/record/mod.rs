@@ -10,6 +10,6 @@ pub use file::{
     calibration_to_json, is_postcard, read_calibration, write_calibration,
 };
 pub use fixed::{
-    BoardReceptor, FIXED_STEP, FixedRecord, RecordNumbers, converter_reach, fit_error,
-    fixed_record, parse_adc,
+    BoardReceptor, FIXED_STEP, FixedRecord, RecordNumbers, change_per_code, converter_reach,
+    fit_error, fixed_record, parse_adc,
 };

@@ -406,6 +406,27 @@ def test_what_the_simulator_raises_comes_out_as_it_is():
     assert any("test_diagnosis.py" in str(entry.path) for entry in caught.traceback)
 
 
+@pytest.mark.skipif(sys.version_info < (3, 11), reason="exceptions have notes from Python 3.11")
+def test_a_note_says_at_which_values_the_simulator_failed():
+    class Diverging(Spring):
+        def simulate(self, params, effects):
+            raise OverflowError("math range error")
+
+    with pytest.raises(OverflowError) as caught:
+        diagnose(Diverging(), BENT)
+    (note,) = caught.value.__notes__
+    assert re.search("called with (. models, the first of them with )?compliance = 2, bend = 0", note)
+
+    with pytest.raises(KeyError) as caught:
+        diagnose(lambda params, effects, inputs: 2.0 * inputs["force_N"], BENT, inputs=(), wrap=None)
+    where, why = caught.value.__notes__
+    assert where == "the simulator was called with compliance = 2, bend = 0"
+    assert why.startswith("the recording has the column force_N, but the argument inputs= of diagnose (or of a Stage) does not")
+    with pytest.raises(KeyError) as caught:
+        diagnose(lambda params, effects, inputs: params["stiffness"] * inputs["force_N"], BENT)
+    assert len(caught.value.__notes__) == 1
+
+
 def test_values_that_are_refused_turn_the_fit_back():
     class Careful(Spring):
         refused = 0

@@ -689,8 +689,8 @@ def diagnose(
     StretchError
         If the data, the arguments or the arrays that the simulator returns are wrong. The message says what to do.
     Exception
-        Any exception of the simulator or of `progress`, unchanged. Only `Refused` is handled: it tells the fit that these
-        values cannot be simulated.
+        Any exception of the simulator or of `progress`. From Python 3.11 on, a note of the exception says with which values the
+        simulator was called. Only `Refused` is handled: it tells the fit that these values cannot be simulated.
 
     Warns
     -----
@@ -740,6 +740,7 @@ def diagnose(
                 "there is no simulator, because simulator is None; give one, or give the path of a problem.toml as data"
             )
         trials = entries.trials(data, rate_hz)
+        asked.recorded = frozenset(str(column) for trial in trials for column in trial.columns)
         if (output is None) == (stages is None):
             raise StretchError(f"give either output, the name of the measured column, or stages{_example(data, trials)}")
         listed = list(stages or [entries.Stage(str(output), inputs, velocity=velocity, position=position)])

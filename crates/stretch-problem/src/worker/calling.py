@@ -19,7 +19,7 @@ arrays by output. A method `begin(session)` is called once, with everything that
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -98,6 +98,7 @@ class Asked:
         self.answers = 0  # calls that returned something
         self.counted: Callable[[int], Any] | None = None  # called with the number of models of each call
         self.refusal: ValueError | None = None  # the last one that the simulator raised
+        self.recorded: frozenset[str] = frozenset()  # columns of the recordings, also those that `inputs` does not contain
         self.call: Callable[..., Any] = method if self.many else simulator  # type: ignore[assignment]
         self.batch = max(1, int(getattr(simulator, "batch", BATCH))) if self.many else 1
         self.optional = self._optional()
@@ -163,12 +164,16 @@ class Asked:
         if callable(begin):
             begin(session)
 
-    def called(self, *args: Any, **more: Any) -> Any:
-        """Call the simulator, and return its answer."""
+    def called(self, params: Any, effects: Any, **more: Any) -> Any:
+        """Call the simulator, and return its answer. An exception gets a note with the values of the call."""
         try:
-            answer = self.call(*args, **more)
-        except ValueError as error:
-            self.refusal = error
+            answer = self.call(params, effects, **more)
+        except Exception as error:
+            for words in self._circumstances(error, params, effects, more):
+                if hasattr(error, "add_note"):  # from Python 3.11
+                    error.add_note(words)
+            if isinstance(error, ValueError):
+                self.refusal = error
             if type(error) is ValueError and "read-only" in str(error) and "inputs" in more:
                 raise StretchError(
                     f"the simulator changes inputs in place, but inputs are read-only ({error}); "
@@ -177,6 +182,19 @@ class Asked:
             raise
         self.answers += 1
         return answer
+
+    def _circumstances(self, error: Exception, params: Any, effects: Any, more: Mapping[str, Any]) -> Iterator[str]:
+        """Yield notes on an exception of the simulator."""
+        named = [(name, table[name]) for table, names in ((params, self.parameters), (effects, self.effects)) for name in names]
+        first = ", ".join(f"{name} = {np.ravel(values)[0]:.6g}" for name, values in named) or "no parameters and no effects"
+        models = len(params) if self.many else 1
+        yield f"the simulator was called with {f'{models} models, the first of them with ' if models > 1 else ''}{first}"
+        missing = error.args[0] if isinstance(error, KeyError) and error.args else None
+        if "inputs" in more and missing in self.recorded.difference(more["inputs"]):
+            yield (
+                f"the recording has the column {missing}, but the argument inputs= of diagnose (or of a Stage) does not name it; "
+                "add it there"
+            )
 
     def samples(self, trials: int) -> int:
         """Return the number of samples of the first `trials` trials."""

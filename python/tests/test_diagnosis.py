@@ -57,6 +57,29 @@ def bent():
     return diagnose(Spring(), BENT)
 
 
+def test_a_column_can_be_named_by_the_last_part_of_its_path():
+    question = {
+        "output": "length_mm",
+        "inputs": "force_N",
+        "parameters": {"compliance": stretch_gap.Parameter(2.0, relative=0.1)},
+        "noise": {"length_mm": 0.02},
+        "wrap": ["output.backlash"],
+    }
+
+    def spring(params, effects, inputs):
+        return params["compliance"] * inputs["force_N"]
+
+    log = {"time_s": np.arange(FORCE.size) / RATE_HZ, "log.force_N": FORCE, "log/length_mm": STIFFER + noise(FORCE.size)}
+    found = stretch_gap.diagnose(spring, stretch_gap.Trial(log), **question)
+    assert found.verdict == "parameters"
+    later = {"time_s": log["time_s"], "new.force_N": -FORCE, "new.length_mm": -log["log/length_mm"]}
+    assert found.fix().predict(later).times_noise < 1.1
+    with pytest.raises(stretch_gap.StretchError, match=r"there is no column length_mm \(did you mean"):
+        stretch_gap.diagnose(spring, {**log, "other.length_mm": FORCE}, **question)
+    with pytest.raises(stretch_gap.StretchError, match="noise: there is no column width_mm"):
+        stretch_gap.diagnose(spring, log, **{**question, "noise": {"width_mm": 0.02}})
+
+
 def test_wrappers_are_listed_with_their_sides():
     listed = stretch_gap.wrappers()
     kinds = dict(zip(listed["kind"], listed["wrap"]))

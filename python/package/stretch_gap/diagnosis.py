@@ -740,17 +740,20 @@ def diagnose(
                 "there is no simulator, because simulator is None; give one, or give the path of a problem.toml as data"
             )
         trials = entries.trials(data, rate_hz)
-        asked.recorded = frozenset(str(column) for trial in trials for column in trial.columns)
         if (output is None) == (stages is None):
             raise StretchError(f"give either output, the name of the measured column, or stages{_example(data, trials)}")
         listed = list(stages or [entries.Stage(str(output), inputs, velocity=velocity, position=position)])
-        units = _by_column("units", units, '{"force": "N"}', trials, entries.text)
-        noise = _by_column("noise", noise, '{"length_mm": 0.1}', trials, entries.deviation)
+        units = entries.by_name("units", units, '{"force": "N"}')
+        noise = entries.by_name("noise", noise, '{"length_mm": 0.1}')
+        beside = entries.texts("beside", beside)
+        wanted = entries.wanted(listed, [*beside, *([reference] if reference else [])])
+        trials = entries.trials(trials, rate_hz, [*wanted, *units, *noise])
+        asked.recorded = frozenset(str(column) for trial in trials for column in trial.columns)
+        units = _by_column("units", units, asked.recorded, entries.text)
+        noise = _by_column("noise", noise, asked.recorded, entries.deviation)
         wrappers = _wrappers(entries.texts("wrap", wrap), listed, asked, notes)
         own = [entries.effect(key, value) for key, value in entries.by_name("effects", effects, EFFECTS).items()]
         off = [a["range"][0] if a["off"] is None else a["off"] for effect in own for a in effect["argument"]]
-        beside = entries.texts("beside", beside)
-        wanted = entries.wanted(listed, [*beside, *([reference] if reference else [])])
         problem = {
             "stage": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
             "input": _inputs(listed, units, noise if asked.takes_inputs else {}),
@@ -797,11 +800,9 @@ def _example(data: Any, trials: Sequence[entries.Trial]) -> str:
 
 
 def _by_column(
-    what: str, given: Any, example: str, trials: Sequence[entries.Trial], value_of: Callable[[str, Any], Any]
+    what: str, values: Mapping[str, Any], columns: frozenset[str], value_of: Callable[[str, Any], Any]
 ) -> dict[str, Any]:
     """Return values by column that the user gave. Columns that no recording has are refused."""
-    columns = {str(column) for trial in trials for column in trial.columns}
-    values = entries.by_name(what, given, example)
     for column in values:
         if column not in {*columns, *entries.CLOCKS}:
             raise unknown("column", column, sorted(columns), f"{what}: ")

@@ -43,10 +43,11 @@ class Joint:
     scale: float
 
 
-def trials(recording: entries.Data, rate_hz: float | None) -> list[entries.Trial]:
-    """Return the recordings in `recording`, each with its time stamps or its sample rate."""
+def trials(recording: entries.Data, rate_hz: float | None, asked: object) -> list[entries.Trial]:
+    """Return the recordings in `recording`, each with its time stamps or its sample rate. For `asked` see `found`."""
     made = []
-    for trial in entries.trials(recording, rate_hz):
+    wanted = [column for pair in asked.values() for column in pair] if isinstance(asked, Mapping) else []
+    for trial in entries.trials(recording, rate_hz, wanted):
         columns = dict(trial.columns)
         rate, time_s = entries.clock(trial.name or "the recording", columns, trial, rate_hz)
         made.append(entries.Trial(columns, rate_hz=rate, time_s=time_s, name=trial.name, test=trial.test, start_s=trial.start_s))

@@ -355,7 +355,7 @@ def problem(
     mujoco = library()
     spec = specification(mujoco, model)
     compiled = spec.compile()
-    given = trials(recording, rate_hz)
+    given = trials(recording, rate_hz, joints)
     hinges = {
         compiled.joint(i).name: int(compiled.jnt_type[i]) in (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
         for i in range(compiled.njnt)

@@ -6,7 +6,7 @@ import operator
 import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Union
 
 import numpy as np
@@ -204,14 +204,17 @@ ParameterLike = Union[Parameter, float, "tuple[float, float]"]
 EffectLike = Union[Effect, Argument, "tuple[float, float]", "tuple[float, float, float]"]
 
 
-def trials(data: Data, rate_hz: float | None) -> list[Trial]:
-    """Return the recordings in `data`: a dict of arrays, a data frame, a `Trial`, the path of a recording, or a list of these."""
+def trials(data: Data, rate_hz: float | None, wanted: Iterable[str] = ()) -> list[Trial]:
+    """Return the recordings in `data`: a dict of arrays, a data frame, a `Trial`, the path of a recording, or a list of these.
+
+    A column in `wanted` may be named by the last part of its path, if only one path has this ending.
+    """
     if isinstance(data, Trial):
-        return [data]
+        return [replace(data, columns=by_last_part(data.columns, wanted))]
     if isinstance(data, (str, os.PathLike)):
         data = read(data)
     if isinstance(data, (list, tuple)):
-        return [one for part in data for one in trials(part, rate_hz)]
+        return [one for part in data for one in trials(part, rate_hz, wanted)]
     if hasattr(data, "columns") and not isinstance(data, Mapping):  # a data frame of any library
         frame: Any = data
         index: Any = getattr(frame, "index", None)
@@ -231,7 +234,18 @@ def trials(data: Data, rate_hz: float | None) -> list[Trial]:
     notes = data.notes if isinstance(data, Recording) else []
     lost = [note for note in notes if re.search(r"\brows?\b.* (is|are) left out", note)]
     doubt(("missing_samples", f"{name}: {note}; such samples count as lost") for note in lost)
-    return [Trial(columns, rate_hz=None if time_s is not None else rate_hz, time_s=time_s, name=name)]
+    named = by_last_part(columns, wanted)
+    return [Trial(named, rate_hz=None if time_s is not None else rate_hz, time_s=time_s, name=name)]
+
+
+def by_last_part(columns: Mapping[str, ArrayLike], wanted: Iterable[str]) -> Mapping[str, ArrayLike]:
+    """Rename the columns that `wanted` names by the last part of their paths to this part, as the reader of files does."""
+    renamed = {}
+    for name in wanted if isinstance(columns, Mapping) else ():
+        paths = [path for path in columns if str(path).endswith((f"/{name}", f".{name}"))]
+        if len(paths) == 1 and name not in columns:
+            renamed[paths[0]] = name
+    return {renamed.get(path, path): values for path, values in columns.items()} if renamed else columns
 
 
 def recorded(data: Data, rate_hz: float | None, wanted: Iterable[str]) -> list[tuple[dict[str, Any], float, bool]]:
@@ -239,7 +253,7 @@ def recorded(data: Data, rate_hz: float | None, wanted: Iterable[str]) -> list[t
     wanted = list(dict.fromkeys(wanted))
     made: list[tuple[dict[str, Any], float, bool]] = []
     begins_s = 0.0
-    every = trials(data, rate_hz)
+    every = trials(data, rate_hz, wanted)
     if not every:
         raise StretchError("data is empty; give at least one recording")
     for i, trial in enumerate(every):

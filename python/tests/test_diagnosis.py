@@ -311,6 +311,27 @@ def test_notes_name_what_may_have_been_overlooked():
     assert "angle_deg jumps by 360 deg" in said and "sent_deg jumps by nearly a full turn and is not unwrapped" in said
 
 
+def test_a_parameter_far_outside_its_tolerance_is_corrected_in_the_fix():
+    def spring(params, effects, inputs):
+        return params["compliance"] * inputs["force_N"] + params["slack"]
+
+    parameters = {"compliance": stretch_gap.Parameter(2.0, relative=0.05), "slack": 0.5}
+    found = diagnose(spring, 2.8 * FORCE + 0.5 + noise(FORCE.size), parameters=parameters, effects={})
+    fix = found.fix()
+    assert (found.verdict, found.named) == ("record", []) and "compliance is 2.8" in found.sentence
+    assert found.parameters == fix.parameters == {"compliance": pytest.approx(2.8, abs=0.01)}
+    least, greatest = found.parameter_intervals["compliance"]
+    assert least < fix.parameters["compliance"] < greatest and f"'compliance': {fix.parameters['compliance']!r}" in fix.code
+    np.testing.assert_allclose(fix(inputs={"force_N": FORCE}), 2.8 * FORCE + 0.5, atol=0.1)
+    for run in (fix.diagnose, lambda: fix.predict({"force_N": FORCE, "length_mm": FORCE}, rate_hz=RATE_HZ)):
+        with pytest.raises(stretch_gap.StretchError, match="can be called, but it cannot predict or diagnose"):
+            run()
+    wrong = diagnose(spring, -(2.0 * FORCE + 0.5) + noise(FORCE.size), effects={}, parameters=parameters)
+    assert wrong.verdict == "record" and "upside down" in wrong.sentence
+    with pytest.raises(stretch_gap.StretchError, match="the recording is wrong, so nothing was fitted to it"):
+        wrong.fix()(inputs={"force_N": FORCE})
+
+
 def test_a_fix_predicts_new_recordings_and_is_diagnosed_again():
     def spring(params, effects, inputs):
         return params["compliance"] * inputs["force_N"] + effects["bend"] * inputs["force_N"] ** 2

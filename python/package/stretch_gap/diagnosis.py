@@ -111,7 +111,8 @@ class Diagnosis:
         - `"parameters"`: they agree after the parameters are re-tuned within their tolerances.
         - `"effect"`: effects are missing and are named.
         - `"partial"`: effects are missing and are named, but they leave a part of the gap.
-        - `"record"`: the recording itself is wrong, for example a column.
+        - `"record"`: the recording itself is wrong, for example a column, or a parameter of the simulator is far outside its
+          tolerance.
         - `"unknown"`: there is a gap that no effect of the list explains.
         """
         return str(self._answer["verdict"])
@@ -216,8 +217,11 @@ class Diagnosis:
 
     @property
     def parameters(self) -> dict[str, float]:
-        """Values of all nominal parameters, dict by name, re-tuned together with the named effects."""
-        return {p["name"]: p["fitted"] for p in self._answer["parameters"]}
+        """Values of the nominal parameters that have a tolerance, dict by name, re-tuned together with the named effects.
+
+        A parameter that is far outside its tolerance (verdict `"record"`) has the value with which the simulator agrees.
+        """
+        return {p["name"]: p["fitted"] for p in self._answer["parameters"]} | _corrected(self._answer)
 
     @property
     def effects(self) -> dict[str, dict[str, float]]:
@@ -238,7 +242,7 @@ class Diagnosis:
         """
         shifts = self._answer["parameters"]
         reach = {p["name"]: 1.96 * p.get("sd", 0.0) for p in shifts}
-        return {p["name"]: (p["fitted"] - reach[p["name"]], p["fitted"] + reach[p["name"]]) for p in shifts}
+        return {name: (value - reach[name], value + reach[name]) for name, value in self.parameters.items()}
 
     @property
     def effect_intervals(self) -> dict[str, dict[str, tuple[float, float]]]:
@@ -728,6 +732,7 @@ def diagnose(
         raise StretchError("depth is 0, the largest number of effects that may be named; give 1 or more")
     asked = None if simulator is None else Asked(simulator)
     notes: list[str] = []
+    nominal: dict[str, float] = {}
     off: list[float] = []
     if isinstance(data, (str, os.PathLike)) and os.fspath(data).endswith(".toml"):
         if output is not None or stages is not None or parameters or effects:
@@ -754,12 +759,12 @@ def diagnose(
         wrappers = _wrappers(entries.texts("wrap", wrap), listed, asked, notes)
         own = [entries.effect(key, value) for key, value in entries.by_name("effects", effects, EFFECTS).items()]
         off = [a["range"][0] if a["off"] is None else a["off"] for effect in own for a in effect["argument"]]
+        shipped = [entries.parameter(key, value) for key, value in entries.by_name("parameters", parameters, PARAMETERS).items()]
+        nominal = {one["name"]: one["value"] for one in shipped}
         problem = {
             "stage": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
             "input": _inputs(listed, units, noise if asked.takes_inputs else {}),
-            "parameter": [
-                entries.parameter(key, value) for key, value in entries.by_name("parameters", parameters, PARAMETERS).items()
-            ],
+            "parameter": shipped,
             "effect": own,
             "wrap": wrappers,
             "without": entries.texts("without", without),
@@ -781,7 +786,14 @@ def diagnose(
         "experiment": experiment,
     }
     session = json.loads(checked.session)
-    return run(checked, session, asked, how, progress, notes, off=dict(zip(session["effects"], off)))
+    return run(checked, session, asked, how, progress, notes, nominal, dict(zip(session["effects"], off)))
+
+
+def _corrected(answer: Mapping[str, Any]) -> dict[str, float]:
+    """Return the parameters that are far outside their tolerances, if nothing else is wrong, with the values that fit."""
+    errors = (answer.get("answer") or {}).get("errors", [])
+    values = {one["parameter"]: one["found"] for one in errors if one["what"] == "parameter"}
+    return values if len(values) == len(errors) else {}
 
 
 EFFECTS = '{"friction": (0.0, 5.0)}, with the least and the greatest value; effects around the simulator belong in wrap'
@@ -822,13 +834,13 @@ def run(
     how: dict[str, Any],
     progress: Callable[[str], Any] | None,
     notes: list[str],
-    *,
+    nominal: dict[str, float],
     off: dict[str, float],
     earlier: Fix | None = None,
 ) -> Diagnosis:
     """Diagnose a checked problem with its parsed session. `notes` precede the notes of the diagnosis.
 
-    For `off` see `Again`. `earlier` is the fix that is in the problem.
+    For `nominal` and `off` see `Again`. `earlier` is the fix that is in the problem.
     """
     if asked is not None:
         asked.bind({**session, "columns": checked.columns})
@@ -844,7 +856,7 @@ def run(
             ) from asked.refusal
     answer = json.loads(text)
     answer["notes"] = notes + answer["notes"]
-    again = None if fixed is None else Again(fixed, asked, how, session, off)
+    again = Again(fixed, asked, how, session, nominal, off) if fixed or _corrected(answer) else None
     return Diagnosis(answer, page, curves, functions, trial, session, again, earlier)
 
 

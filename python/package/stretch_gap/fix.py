@@ -27,14 +27,16 @@ COPIED = "a copy or a pickle does not contain the simulator; use the original ob
 class Again:
     """Inputs of a run of the fixed simulator.
 
-    `fixed` is the fixed problem, `asked` the user's simulator, `how` the options and `session` the session of the diagnosis.
-    `off` holds the values at which the simulator's own effects do nothing.
+    `fixed` is the fixed problem, None if only a parameter was corrected that is far outside its tolerance, `asked` the user's
+    simulator, `how` the options and `session` the session of the diagnosis. `nominal` holds the parameters as given, and `off`
+    the values at which the simulator's own effects do nothing.
     """
 
-    fixed: Fixed
+    fixed: Fixed | None
     asked: Asked | None
     how: dict[str, Any]
     session: dict[str, Any]
+    nominal: dict[str, float]
     off: dict[str, float]
 
 
@@ -47,7 +49,7 @@ class Fix:
     Attributes
     ----------
     parameters : dict of str to float
-        Values of all nominal parameters, re-tuned together with the named effects.
+        Values of the nominal parameters that have a tolerance, re-tuned together with the named effects.
     effects : dict of str to dict of str to float
         Values of the named effects, by effect and argument. A fix of a fixed simulator also has the effects of the earlier fix.
     code : str
@@ -118,8 +120,8 @@ class Fix:
         ------
         StretchError
             If an effect cannot be applied from outside the simulator, because it depends on more than the column that it alters.
-            If the fix cannot be run, because the diagnosis was read from text, has the verdict `"unknown"` or `"record"`, or ran
-            the simulator of a `problem.toml`. If an argument is unknown or missing.
+            If the fix cannot be run, because the diagnosis was read from text, has the verdict `"unknown"`, found an error of the
+            recording, or ran the simulator of a `problem.toml`. If an argument is unknown or missing.
 
         Examples
         --------
@@ -132,13 +134,17 @@ class Fix:
         """
         again, asked = self._called()
         named.update(zip(list(asked.signature.parameters)[2:], more))
-        values = {**self.parameters, **_by_name("parameter", params, asked.parameters)}
+        values = {**again.nominal, **self.parameters, **_by_name("parameter", params, asked.parameters)}
         own = {**again.off, **_by_name("effect", effects, asked.effects)}
         for effect, found in self.effects.items():
             own.update({key: x for name, x in found.items() for key in (effect, f"{effect}.{name}") if key in asked.effects})
-        for name in asked.effects:
-            if name not in own:
-                raise StretchError(f"effects: there is no value of {name}; give the value at which it does nothing")
+        for what, table, names, todo in (
+            ("params", values, asked.parameters, "its value"),
+            ("effects", own, asked.effects, "the value at which it does nothing"),
+        ):
+            for name in names:
+                if name not in table:
+                    raise StretchError(f"{what}: there is no value of {name}; give {todo}")
         if asked.many and "inputs" in named:  # a simulator of many models takes one row per model
             named["inputs"] = {name: np.atleast_2d(values) for name, values in named["inputs"].items()}
         spans = [trial.samples for trial in named.get("trials", [] if asked.is_called_once_a_trial else asked.spans)]
@@ -249,10 +255,10 @@ class Fix:
         >>> round(predicted.times_noise)
         1
         """
-        again, recorded = self._recorded(data, rate_hz)
-        fitted, begins_s = again.fixed.fitted
+        again, fixed, recorded = self._recorded(data, rate_hz)
+        fitted, begins_s = fixed.fitted
         later = [(columns, begins_s + start_s, True) for columns, start_s, _ in recorded]
-        checked = again.fixed.problem(later, False)
+        checked = fixed.problem(later, False)
         session = json.loads(checked.session)
         if again.asked is not None:
             again.asked.bind({**session, "columns": checked.columns})
@@ -305,19 +311,30 @@ class Fix:
         """
         from .diagnosis import run
 
-        again, others = (self._runnable(), []) if data is None else self._recorded(data, rate_hz)
-        problem = again.fixed.problem(others, data is not None)
-        return run(problem, json.loads(problem.session), again.asked, again.how, progress, [], off=again.off, earlier=self)
+        again, fixed, others = (*self._fixed(), []) if data is None else self._recorded(data, rate_hz)
+        problem = fixed.problem(others, data is not None)
+        return run(problem, json.loads(problem.session), again.asked, again.how, progress, [], again.nominal, again.off, self)
 
-    def _recorded(self, data: entries.Data, rate_hz: float | None) -> tuple[Again, list[tuple[dict[str, Any], float, bool]]]:
+    def _recorded(
+        self, data: entries.Data, rate_hz: float | None
+    ) -> tuple[Again, Fixed, list[tuple[dict[str, Any], float, bool]]]:
         """Return new recordings, if the simulator can be driven by them."""
-        again = self._runnable()
+        again, fixed = self._fixed()
         if again.asked and again.asked.optional <= {"stage"} and not hasattr(again.asked.simulator, "begin"):
             raise StretchError(
                 "the simulator does not take the argument inputs, so it can only repeat the recordings that were fitted; let it "
                 "take the columns of a recording, as in simulate(params, effects, inputs), and diagnose again"
             )
-        return again, entries.recorded(data, rate_hz, again.fixed.columns)
+        return again, fixed, entries.recorded(data, rate_hz, fixed.columns)
+
+    def _fixed(self) -> tuple[Again, Fixed]:
+        again = self._runnable()
+        if again.fixed is None:
+            raise StretchError(
+                "this fix can be called, but it cannot predict or diagnose, because a parameter is far outside its tolerance; "
+                "diagnose again with the value in fix.parameters"
+            )
+        return again, again.fixed
 
     def _runnable(self) -> Again:
         if self._again is None:

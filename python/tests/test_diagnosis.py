@@ -84,6 +84,7 @@ def test_wrappers_are_listed_with_their_sides():
     listed = stretch_gap.wrappers()
     kinds = dict(zip(listed["kind"], listed["wrap"]))
     assert kinds["backlash"] == "input, output" and set(kinds.values()) > {"input", "output"}
+    assert not hasattr(listed, "columns") or "wrap" in repr(listed).splitlines()[0]
     assert all(listed["words"]) and all(listed["equation"])
 
 
@@ -164,7 +165,8 @@ def test_what_was_found_is_shown_as_text_table_page_and_code(bent, tmp_path):
     page = bent.report(tmp_path / "d.html")
     assert page.startswith("<!DOCTYPE html>") and page.count("<svg") > 3
     assert (tmp_path / "d.html").read_text(encoding="utf-8") == page
-    assert "<iframe srcdoc=" in bent._repr_html_() and "scrollHeight" in bent._repr_html_()
+    assert bent._repr_html_().startswith("<iframe srcdoc=") and "scrollHeight" in bent._repr_html_()
+    assert bent._repr_html_().count(bent.sentence[:30]) == bent.report().count(bent.sentence[:30])
     assert "<iframe" not in again._repr_html_()
     found = {}
     exec(bent.fix().code, found)  # what a user would paste
@@ -349,6 +351,8 @@ def test_a_fix_predicts_new_recordings_and_is_diagnosed_again():
     if importlib.util.find_spec("matplotlib"):
         top, bottom = predicted.plot("length_mm")
         assert len(top.lines) == 3 and len(bottom.lines) == 2
+    wide = fix.predict([recording(2.0 * FORCE, 4), recording(-2.0 * FORCE, 5)], rate_hz=RATE_HZ).notes
+    assert {note.split(": ")[0] for note in wide if "was fitted" in note} == {"recording 1", "recording 2"}
     off = [np.std(curves[name] - curves["measured"]) for name in ("without", "with_effects")]
     assert off[1] == pytest.approx(predicted.outputs[0]["rmse"], rel=0.05) and off[1] < 0.1 * off[0]
     for again in (fix.diagnose(), fix.diagnose(recording(FORCE[::-1].copy(), 2), rate_hz=RATE_HZ)):
@@ -529,6 +533,7 @@ def test_answers_that_are_none_say_what_was_expected(answer, words):
         ({"seed": 1.5}, "seed is 1.5; give a whole number"),
         ({"wrap": ["input.delay"]}, "must take the argument inputs"),
         ({"effects": {"bend": 0.3}}, "effect bend is 0.3; give"),
+        ({"effects": {"compliance": (0.0, 1.0)}}, "effects: compliance is also the name of a parameter; give the effect another"),
         ({"effects": {"bend": (0.05, -0.05)}}, "the range 0.05 to -0.05 is empty"),
         ({"parameters": {"compliance": stretch_gap.Parameter(0.0, relative=0.1)}}, "give an absolute tolerance"),
         ({"effects": {"bend": (0.05, "x")}}, "effect bend: the greatest value is 'x'; give a finite number"),

@@ -557,13 +557,14 @@ class Diagnosis:
         return "\n".join(lines)
 
     def _repr_html_(self) -> str:
-        sentence = f"<p><b>{escape(self.sentence)}</b></p>"
         if self._page:
-            # An iframe keeps the styles of the page and of the notebook apart. It takes the height of its content.
+            # An iframe keeps the styles of the page and of the notebook apart. It takes the height of its content. The page
+            # begins with the sentence.
             fit = "this.style.height=this.contentDocument.documentElement.scrollHeight+'px'"
             style = "width:100%;height:40em;border:0"
-            return f'{sentence}<iframe srcdoc="{escape(self._page)}" style="{style}" onload="{fit}"></iframe>'
+            return f'<iframe srcdoc="{escape(self._page)}" style="{style}" onload="{fit}"></iframe>'
         rows = [[name, f"{p:.3f}"] for name, p in self.probabilities.items()]
+        sentence = f"<p><b>{escape(self.sentence)}</b></p>"
         return sentence + html.table(["candidate", "probability"], rows) + html.notes(self.notes)
 
 
@@ -761,6 +762,9 @@ def diagnose(
         off = [a["range"][0] if a["off"] is None else a["off"] for effect in own for a in effect["argument"]]
         shipped = [entries.parameter(key, value) for key, value in entries.by_name("parameters", parameters, PARAMETERS).items()]
         nominal = {one["name"]: one["value"] for one in shipped}
+        for one in own:
+            if one["name"] in nominal:
+                raise StretchError(f"effects: {one['name']} is also the name of a parameter; give the effect another name")
         problem = {
             "stage": [entries.stage(one, i, units, noise) for i, one in enumerate(listed)],
             "input": _inputs(listed, units, noise if asked.takes_inputs else {}),
@@ -867,8 +871,8 @@ def wrappers() -> Any:
     -------
     pandas.DataFrame or dict of str to list
         Table with one row for each kind and these columns: `kind` (its name, as used in the argument `wrap` of `diagnose`),
-        `wrap` (sides of the simulator, `input` or `output`, at which `wrap="all"` searches for it), `words` (a description) and
-        `equation` (in which x is the signal before and y the signal after the effect). A dict of columns if pandas is not
+        `words` (a description), `equation` (in which x is the signal before and y the signal after the effect) and `wrap` (sides
+        of the simulator, `input` or `output`, at which `wrap="all"` searches for it). A dict of columns if pandas is not
         installed.
 
     Examples
@@ -878,8 +882,9 @@ def wrappers() -> Any:
     >>> "delay" in list(kinds["kind"])
     True
     """
-    keys = ("kind", "wrap", "words", "equation")
-    return frame([dict(zip(keys, one)) for one in _stretch.wrappers()])
+    # pandas prints the first and the last columns of a wide table.
+    keys = ("kind", "words", "equation", "wrap")
+    return frame([dict(zip(keys, (kind, *words, sides))) for kind, sides, *words in _stretch.wrappers()])
 
 
 def _wrappers(names: list[str], stages: Sequence[entries.Stage], asked: Asked, notes: list[str]) -> list[str]:

@@ -410,7 +410,8 @@ class Prediction:
 
         Do not trust a prediction outside the fitted range.
         """
-        return [words for trial in self._answer["trials"] for words in trial["extrapolated"]] + list(self._answer["notes"])
+        outside = [f"{trial['name']}: {words}" for trial in self._answer["trials"] for words in trial["extrapolated"]]
+        return outside + list(self._answer["notes"])
 
     def curves(self, output: str | None = None) -> dict[str, Array]:
         """Return the measured and the predicted curves of one output, all new recordings end to end.

@@ -113,7 +113,7 @@ def test_a_sample_without_a_number_is_left_out_as_in_a_file(fitted, tmp_path, sp
     signal, angle = fitted
     time_s = np.arange(signal.size) / RATE_HZ
     broken = np.where(np.arange(signal.size) == 700, spoilt, signal)
-    with pytest.warns(stretch_gap.DoubtWarning, match=r"1 of 2000 samples count as lost \(700\)") as warned:
+    with pytest.warns(stretch_gap.DoubtWarning, match="1 of 2000 samples counts as lost: sample 700") as warned:
         one = stretch_gap.calibrate(broken, angle, RATE_HZ, model="linear")
     assert warned[0].message.code == "missing_samples" and warned[0].filename == __file__
     path = tmp_path / "log.csv"
@@ -125,7 +125,7 @@ def test_a_sample_without_a_number_is_left_out_as_in_a_file(fitted, tmp_path, sp
     model = json.loads(one.to_json())["model"]
     assert json.loads(same.to_json())["model"] == model
     stamps = np.where(np.arange(signal.size) == 700, spoilt, time_s)
-    with pytest.warns(stretch_gap.DoubtWarning, match=r"1 of 2000 .* lost \(700\): sample 700 of time_s is"):
+    with pytest.warns(stretch_gap.DoubtWarning, match="1 of 2000 samples counts as lost: sample 700 of time_s is"):
         same = stretch_gap.calibrate(signal, angle, time_s=stamps, model="linear")
     assert json.loads(same.to_json())["model"] == model
     with pytest.raises(stretch_gap.StretchError, match=r"time_s, sample 700: .* is not a time; leave this sample out"):

@@ -136,9 +136,7 @@ def test_one_input_may_be_given_by_its_name(bent):
 
 def test_a_missing_sample_is_bridged_with_a_warning():
     broken = np.where(np.arange(BENT.size) == 1000, np.nan, BENT)
-    with pytest.warns(
-        stretch_gap.DoubtWarning, match=r"1 of 6000 samples count as lost \(1000\): sample 1000 of length_mm is nan"
-    ):
+    with pytest.warns(stretch_gap.DoubtWarning, match="1 of 6000 samples counts as lost: sample 1000 of length_mm is nan"):
         found = diagnose(Spring(), broken)
     assert found.named == ["bend"] and any("1 lost sample is bridged" in note for note in found.notes)
 
@@ -493,8 +491,8 @@ def test_values_that_are_refused_turn_the_fit_back():
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        (lambda length: length[:-1], r"returned the shape \(5999,\) for length_mm; \(6000,\) was expected"),
-        (lambda length: np.zeros((2, length.size)), r"the shape \(2, 6000\) for length_mm; \(6000,\) was expected"),
+        (lambda length: length[:-1], "returned 5999 samples instead of 6000 for length_mm; return one sample for each that"),
+        (lambda length: np.zeros((2, length.size)), r"the shape \(2, 6000\) instead of \(6000,\) for length_mm; return"),
         (lambda length: np.where(np.arange(length.size) == 50, np.nan, length), r"gave NaN at 0\.5 s of the recording"),
         (lambda length: "six", "returned text; return real numbers in the output's unit"),
         (lambda length: length + 0j, "returned complex numbers"),

@@ -115,7 +115,8 @@ def without_missing(what: str, time_s: Array, channels: Sequence[tuple[str, Arra
     if left_out.size == time_s.size:
         raise StretchError(f"{what}: no sample has a number in every column; {name} is {value} in sample {first}")
     some = ", ".join(map(str, left_out[:5])) + (", ..." if left_out.size > 5 else "")
-    words = f"{what}: {left_out.size} of {time_s.size} samples count as lost ({some}): sample {first} of {name} is {value}"
+    count = f"count as lost (samples {some})" if left_out.size > 1 else "counts as lost"
+    words = f"{what}: {left_out.size} of {time_s.size} samples {count}: sample {first} of {name} is {value}"
     doubt([("missing_samples", words)])
     return time_s[present], [(name, values[present]) for name, values in channels]
 

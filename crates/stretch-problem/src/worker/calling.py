@@ -286,15 +286,14 @@ class Asked:
             table = table[np.newaxis]
         whole = samples if self.is_called_once_a_trial else self.samples(len(self.spans))
         if table.ndim != 2 or table.shape[0] != models or table.shape[1] not in (samples, whole):
-            form = f"({models}, {samples})" if self.many else f"({samples},)"
-            also = f" or ({models}, {whole}), all trials end to end" if samples != whole and self.many else ""
-            shape = table.shape if self.many else table.shape[1:]
-            each = "trial behind trial"
-            if self.is_called_once_a_trial:
-                each = "in this trial; a simulator that also takes the argument trials is called once for all of them"
+            found, needed = (table.shape, (models, samples)) if self.many else (table.shape[1:], (samples,))
+            wrong = f"the shape {found} instead of {needed}"
+            if len(found) == len(needed) and table.shape[0] == models:
+                wrong = f"{found[-1]} samples instead of {samples}"
+            also = f" (or {whole} for all trials)" if samples != whole and self.many else ""
+            each = "this trial" if self.is_called_once_a_trial else "all trials end to end"
             raise StretchError(
-                f"the simulator returned the shape {shape} for {output}; {form} was expected{also}: one sample for each that "
-                f"was measured, {each}"
+                f"the simulator returned {wrong}{also} for {output}; return one sample for each that was measured in {each}"
             )
         return np.ascontiguousarray(table[:, :samples])
 

@@ -187,6 +187,25 @@ fn a_column_that_nobody_asks_for_keeps_its_numbers() {
     );
 }
 
+/// pandas writes the index as a first column without a name. A blank column between others gets no note.
+#[test]
+fn a_column_of_numbers_without_a_name_is_left_out_with_a_note() {
+    for (lead, told) in
+        [(true, &["columns left out because they have no name: column 1"][..]), (false, &[])]
+    {
+        let rows = (0..60).map(|i| {
+            let index = if lead { i.to_string() } else { String::new() };
+            format!("{index},{:.2},,{i}", 0.02 * f64::from(i))
+        });
+        let text: Vec<String> = std::iter::once(",time_s,,force".to_owned()).chain(rows).collect();
+        let text = text.join("\n");
+        let Recording { trial, notes } =
+            Recording::from_reader(text.as_bytes(), "t.csv", &ReadOptions::new()).expect("read");
+        assert_eq!((trial.len(), trial.channels.len()), (60, 1));
+        assert_eq!(notes, told);
+    }
+}
+
 /// If columns are required, a hole (a field without a number) in any other column does not lose a row, neither in a
 /// file nor in a stream.
 #[test]

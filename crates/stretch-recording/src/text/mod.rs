@@ -20,7 +20,7 @@ use crate::{
     room::{Packed, Room},
     text::bad_rows::BadRows,
     text::columns::{Columns, located},
-    text::dialect::{BLANKS, Dialect},
+    text::dialect::{BLANKS, Dialect, cells},
     text::header::Header,
     text::lines::Lines,
     text::row::RowFault,
@@ -99,6 +99,7 @@ impl<'a> Table<'a> {
         if let Some(name) = read.map(|i| &header.names[i]).filter(|name| **name != options.time) {
             notes.push(format!("the time is column {name}"));
         }
+        notes.extend(without_name(&header, time, rows));
         let columns = Columns::new(file, &header, time, rate_hz.is_some(), options)?;
         let dialect = Dialect::new(&header, read, options.date_order, rows);
         let values = vec![f64::NAN; header.names.len()];
@@ -195,4 +196,15 @@ impl<'a> Table<'a> {
         }
         joined(file, tracks, notes, options)
     }
+}
+
+/// Returns a note on the columns without a name, such as the index that pandas writes, if the first rows fill them.
+fn without_name(header: &Header, time: Option<usize>, rows: &[(u64, Vec<u8>)]) -> Option<String> {
+    let rows: Vec<_> = rows.iter().filter_map(|(_, row)| cells(row, header.delimiter)).collect();
+    let is_filled = |i: usize| rows.iter().any(|row| row.get(i).is_some_and(|c| !c.is_empty()));
+    let names = header.names.iter().enumerate();
+    let dropped = names.filter(|(i, name)| name.is_empty() && Some(*i) != time && is_filled(*i));
+    let dropped: Vec<String> = dropped.map(|(i, _)| format!("column {}", i + 1)).collect();
+    let names = dropped.join(", ");
+    (!dropped.is_empty()).then(|| format!("columns left out because they have no name: {names}"))
 }

@@ -45,8 +45,8 @@ impl Quantity {
 
     /// Returns the output that replaces this input.
     fn behind(&self) -> Self {
-        let meaning = Cow::Borrowed("the signal with the effect; use it in place of the input");
-        Self { name: "y", unit: self.unit.clone(), meaning, is_record: false }
+        let meaning = format!("the signal with the effect; use it in place of {}", self.name);
+        Self { name: "y", unit: self.unit.clone(), meaning: meaning.into(), is_record: false }
     }
 }
 

@@ -197,10 +197,14 @@ fn extent_of(among: &Among<'_>, site: &Site) -> Result<Extent, ProblemError> {
     if extent.span() > 0.0 {
         return Ok(Extent { session_s: among.columns.session_s(), ..extent });
     }
+    let or = match site.side {
+        Side::Input => ", or leave out the effects at this input",
+        Side::Output => "",
+    };
     Err(ProblemError::value(
         format!("column {column}"),
         format!("it is {} in every sample that may be fitted", extent.low + 0.0),
-        "the channel is dead: check the sensor and its cable, or leave out its wrappers",
+        format!("the channel is dead: check the sensor and its cable{or}"),
     ))
 }
 

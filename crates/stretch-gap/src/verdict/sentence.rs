@@ -40,7 +40,8 @@ impl Diagnosis {
         let nouns = nouns(self.gauge_alone);
         let finding = match answer {
             Answer::Unknown { stage, left, .. } if self.none_examined => format!(
-                "There is a gap in {stage}: the re-tuned {} leaves {left:.2} times the noise.",
+                "There is a gap in {}: the re-tuned {} leaves {left:.2} times the noise.",
+                of_stage(stage, nouns[0]),
                 nouns[0]
             ),
             answer => answer.in_sentences(nouns, probability),
@@ -156,6 +157,11 @@ fn listed(names: &[String]) -> String {
     }
 }
 
+/// Returns the name of a stage in a sentence. `simulator` is the default name of an only stage.
+fn of_stage(stage: &str, simulator: &str) -> String {
+    if stage == simulator { format!("the {stage}") } else { stage.to_owned() }
+}
+
 impl Answer {
     /// Whether effects were found, but clearly more than noise is left after they are added.
     pub fn leaves_more_than_noise(&self) -> bool {
@@ -200,8 +206,9 @@ impl Answer {
                     false => format!("Found, and too small to matter: {}; ", small.join(", ")),
                 };
                 format!(
-                    "{found}with its parameters re-tuned the {simulator} leaves {left:.3} times the noise, most of it in {stage}. Noise as it is described \
-                     stays below {noise:.3} in 19 of 20 recordings like this one: it is larger, or something is missing."
+                    "{found}with its parameters re-tuned the {simulator} leaves {left:.3} times the noise, most of it in {}. Noise as it is described \
+                     stays below {noise:.3} in 19 of 20 recordings like this one: it is larger, or something is missing.",
+                    of_stage(stage, simulator)
                 )
             }
             Self::Missing { effects, closes, faint, ended } => {
@@ -243,7 +250,7 @@ impl Answer {
                     };
                     format!(
                         " Not explained: {share} in {}{sits}; {left:.2} times the noise is left{where_left}.",
-                        rest.stage
+                        of_stage(&rest.stage, simulator)
                     )
                 });
                 let names = numbered(effects, with_share, ", ");
@@ -287,12 +294,14 @@ impl Answer {
                     ),
                 };
                 format!(
-                    "There is a gap in {stage} that the catalogue does not explain: the re-tuned {simulator} leaves {left:.2} times the noise, and {with_best}.{parts}"
+                    "There is a gap in {} that the catalogue does not explain: the re-tuned {simulator} leaves {left:.2} times the noise, and {with_best}.{parts}",
+                    of_stage(stage, simulator)
                 )
             }
             Self::AtBounds { stage, parameters, left, .. } => format!(
-                "The parameters of {stage} do not fit within their tolerances: {} are at the end of them, and {left:.1} times the noise is left \
+                "The parameters of {} do not fit within their tolerances: {} are at the end of them, and {left:.1} times the noise is left \
                  all the same. Is it the right {rig}? If its parameters are right, something is missing that is not in the catalogue.",
+                of_stage(stage, simulator),
                 parameters.join(", ")
             ),
             Self::TooLittle { why } => why.words(),

@@ -9,6 +9,16 @@ pub fn significant(x: f64, digits: usize) -> f64 {
     format!("{x:.*e}", digits.saturating_sub(1)).parse().unwrap_or(x)
 }
 
+/// Returns a unit as it follows a number: a blank and the unit, or nothing if the unit is `1` or empty.
+///
+/// ```
+/// let text = ["mm", "1", ""].map(|unit| format!("4.5{}", stretch_data::after_number(unit)));
+/// assert_eq!(text, ["4.5 mm", "4.5", "4.5"]);
+/// ```
+pub fn after_number(unit: &str) -> String {
+    if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
+}
+
 /// Writes a number with at most `digits` significant digits, without trailing zeros: in plain
 /// notation from 0.0001 to a million, otherwise with an exponent.
 ///

@@ -2,7 +2,7 @@
 
 use std::{f64::consts::TAU, path::Path};
 
-use stretch_data::{Remarks, RigFile, in_digits};
+use stretch_data::{Remarks, RigFile, after_number, in_digits};
 use stretch_effects::EffectParameter;
 use stretch_gap::{Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Model, VerdictKind};
 use stretch_sim::{Effect, SimError, Tolerance};
@@ -164,7 +164,7 @@ impl<'a> Chosen<'a> {
             in_digits(was, 4),
             in_digits(value - COVERS * sd, 4),
             in_digits(value + COVERS * sd, 4),
-            of_unit(unit)
+            after_number(unit)
         )
     }
 
@@ -241,11 +241,7 @@ pub(crate) fn names(file: &RigFile) -> Vec<String> {
 fn effect_remark(p: &EffectValue) -> String {
     let [low, high] = p.interval.map(|x| in_digits(x, 4));
     let form = if p.is_form { "form; " } else { "" };
-    format!("{form}95 %: {low} .. {high}{}", of_unit(&p.unit))
-}
-
-fn of_unit(unit: &str) -> String {
-    if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
+    format!("{form}95 %: {low} .. {high}{}", after_number(&p.unit))
 }
 
 /// Time over which the phase of the mains is assumed constant, s.

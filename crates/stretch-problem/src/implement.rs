@@ -1,6 +1,6 @@
 //! The effects that a diagnosis names, as code to type into a simulator.
 
-use stretch_data::in_digits;
+use stretch_data::{after_number, in_digits};
 use stretch_gap::EffectValue;
 use stretch_sim::{Language, Sketch};
 
@@ -51,7 +51,7 @@ impl Implementation {
 
 /// A number with its unit and its 95 % interval.
 fn with_interval(p: &EffectValue) -> String {
-    let unit = if p.unit == "1" { String::new() } else { format!(" {}", p.unit) };
+    let unit = after_number(&p.unit);
     let [low, high] = p.interval.map(|x| in_digits(x, 4));
     format!("{} = {}{unit} ({low} .. {high})", p.name, in_digits(p.value, 4))
 }

@@ -72,7 +72,7 @@ impl SimError {
         value: f64,
         limits: &RangeInclusive<f64>,
     ) -> Self {
-        let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
+        let unit = stretch_data::after_number(unit);
         let (min, max) = (limits.start(), limits.end());
         Self::Refused(format!("`{owner}`: {name} = {value} is outside {min} .. {max}{unit}"))
     }

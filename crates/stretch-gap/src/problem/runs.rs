@@ -9,7 +9,7 @@ use std::{
     },
 };
 
-use stretch_data::in_digits;
+use stretch_data::{after_number, in_digits};
 
 use crate::problem::{
     error::{GapError, unless_lost},
@@ -274,10 +274,7 @@ impl<'a> Runs<'a> {
     fn asked(&self, run: Run<'_>) -> String {
         let (specs, effects) = (self.simulator.parameters(), self.simulator.effects());
         let one = |name: &str, value: f64, unit: &str| {
-            let rounded = in_digits(value, 4);
-            format!("{name} = {rounded} {}", if unit == "1" { "" } else { unit })
-                .trim_end()
-                .to_owned()
+            format!("{name} = {}{}", in_digits(value, 4), after_number(unit))
         };
         let own = self.simulator.stages()[run.stage].parameters.iter();
         let nominal = own.map(|&p| one(&specs[p].name, run.model.parameters[p], &specs[p].unit));

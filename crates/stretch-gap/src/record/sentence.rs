@@ -1,6 +1,6 @@
 //! Describes errors of the recording and of the rig file in words, with what a user should check.
 
-use stretch_data::in_digits;
+use stretch_data::{after_number, in_digits};
 
 use crate::{
     fit::hypothesis::Hypothesis,
@@ -106,7 +106,7 @@ impl Gross {
             let [simulator, rig] = nouns(suspect.description().record().gauge_alone);
             let spec = &suspect.description().parameters[p];
             let value = hypothesis.model.parameters[p] * (1.0 + size);
-            let unit = if spec.unit == "1" { String::new() } else { format!(" {}", spec.unit) };
+            let unit = after_number(&spec.unit);
             return Some(Self {
                 parameter: Some(spec.name.clone()),
                 factor: Some(value / spec.nominal),
@@ -149,9 +149,9 @@ impl Gross {
                 Self {
                     offset: Some(size),
                     sentence: format!(
-                        "{name} lies {} {} too {side}",
+                        "{name} lies {}{} too {side}",
                         in_digits(size.abs(), 4),
-                        column.unit
+                        after_number(&column.unit)
                     ),
                     ..Self::of_column(GrossKind::Offset, column)
                 }

@@ -1,7 +1,7 @@
 //! Notes about a verdict: gross errors, implausible noise, oscillating parameters, extrapolated
 //! drift, and how strong other effects would have to be for the diagnosis to name them.
 
-use stretch_data::in_digits;
+use stretch_data::{after_number, in_digits};
 
 use crate::{
     evidence::{
@@ -334,7 +334,7 @@ pub(crate) fn detection_limit_note(
     let mut known: Vec<(f64, &DetectionLimit)> = known.collect();
     known.sort_by(|a, b| a.0.total_cmp(&b.0));
     let one = |note: Note, (i, (_, limit)): (usize, &(f64, &DetectionLimit))| {
-        let unit = if limit.unit == "1" { String::new() } else { format!(" {}", limit.unit) };
+        let unit = after_number(&limit.unit);
         let note = note.text(if i == 0 { "" } else { ", " }).effect(&limit.effect);
         note.text(format!(" {}{unit}", in_digits(limit.strength.unwrap_or(0.0), 2)))
     };

@@ -30,7 +30,8 @@ use crate::display::{Output, detail, doubt, warn};
 /// domain are clamped, and the column domain shows it. The models linear and curve
 /// need no rate: they give estimates from the first sample on, with an empty rate at
 /// first. An observer has no warm-up either, but its estimates settle within about a
-/// second after a start or a long gap.
+/// second after a start or a long gap. If one of several gauges has no sample, the row is
+/// kept, and the others give the estimate.
 ///
 /// From standard input each line gets its estimate immediately; a malformed line is
 /// reported on standard error and skipped:

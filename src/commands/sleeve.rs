@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use serde_json::json;
 use stretch_data::Split;
 use stretch_data::files::Outputs;
+use stretch_recording::ReadOptions;
 use stretch_sleeve::{
     Assumed, Expected, Prior, RenewSummary, Session, SleeveCalibration, SleeveError, SleeveFit,
     SleeveOptions,
@@ -13,7 +14,7 @@ use stretch_sleeve::{
 
 use super::{
     json::Json,
-    reading::{Recorded, read_trials, with_columns_to_name},
+    reading::{read_trials, with_columns_to_name},
     shared::{give_stdout, of_files, say, tell, with_unit, write_text},
 };
 use crate::{
@@ -127,8 +128,6 @@ struct RenewArgs {
     #[arg(long, value_name = "cal.json")]
     out: PathBuf,
     #[command(flatten)]
-    recorded: Recorded,
-    #[command(flatten)]
     json: Json,
 }
 
@@ -137,7 +136,7 @@ fn renew(args: RenewArgs) -> anyhow::Result<()> {
     let prior = Prior::read(&args.prior)?;
     let calibration = args.calibration.as_deref().map(SleeveCalibration::read).transpose()?;
     let signals = prior.signals.clone();
-    let columns = signals.iter().fold(args.recorded.options(), |all, name| all.require(name));
+    let columns = signals.iter().fold(ReadOptions::new(), |all, name| all.require(name));
     let trials = read_trials(&args.trials, Split::Fit, &columns);
     let own = "the prior needs these columns: rename them, and convert their units, with stretch convert --column NEW=OLD*FACTOR";
     let trials = trials.map_err(|error| with_columns_to_name(error, own))?;

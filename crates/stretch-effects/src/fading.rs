@@ -65,7 +65,7 @@ pub struct FadingMemory {
 }
 
 impl FadingMemory {
-    /// A memory with a share and time constants on a grid. `reach` is the stroke of the input, which scales the state
+    /// A memory that makes up `share` of the output, with these time constants, for signals sampled on `grid`. `reach` is the stroke of the input, which scales the state
     /// that an unrecorded motion leaves.
     pub fn new(share: f64, times: Times, reach: f64, grid: &Grid) -> Self {
         let lags = times.all().into_iter().map(|tau| MeanReversion::new(tau, reach, grid));

@@ -70,7 +70,7 @@ pub struct Constant {
     pub unit: String,
 }
 
-/// A value that an operator remembers.
+/// A value that an operator keeps from one sample to the next.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cell {
     /// Name in the code.

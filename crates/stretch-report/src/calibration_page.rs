@@ -147,7 +147,7 @@ pub fn readme_picture(calibrated: &[(&str, &Calibrated)], evaluation: &Evaluatio
     first.map_or_else(String::new, |trial| closest_look(evaluation, trial, &names).standalone())
 }
 
-/// Returns one sentence with the error of the last calibration, which is the chosen one.
+/// Returns one sentence that states the error of the chosen calibration, the last of the list.
 pub fn calibration_verdict(judged: &Judged<'_>) -> String {
     let Judged { calibrated, evaluation, context } = *judged;
     let names = method_names(calibrated, evaluation);

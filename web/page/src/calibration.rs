@@ -165,7 +165,7 @@ impl Made {
     }
 
     /// Evaluates the calibration on the test trials, or on the fitted trials if there are no test
-    /// trials. Also evaluates a line, the baseline for every surface.
+    /// trials. Also evaluates a straight line, with which every other model is compared.
     pub(crate) fn judged(&mut self, files: &Files) -> Result<&Judgement, Said> {
         if self.judged.is_none() {
             let options = Options { model: ModelKind::Linear, ..self.options.clone() };

@@ -148,8 +148,8 @@ impl Line {
         off.hypot((self.slope() - other.slope()) * self.spreads[0])
     }
 
-    /// Returns the message of the mistake that best explains the difference between two lines; `None` if none explains
-    /// it.
+    /// Returns the message about the mistake that best explains why two fitted straight lines differ; `None` if no
+    /// mistake explains it.
     fn mistake(self, other: Self) -> Option<&'static str> {
         if ![self, other].iter().all(Self::is_clear) {
             return None;

@@ -60,8 +60,8 @@ pub(crate) struct Sum {
     pub(crate) fit: Fit,
     /// Number of terms in the library.
     pub(crate) library: usize,
-    /// Remainder of the residual (without nuisances) after a ridge regression on many terms at
-    /// once.
+    /// What a ridge regression on many terms at once leaves of the residual, from which the
+    /// nuisances were removed before.
     pub(crate) beside_many: Vec<f64>,
 }
 

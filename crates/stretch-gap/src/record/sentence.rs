@@ -99,7 +99,7 @@ impl Gross {
         }
     }
 
-    /// Describes the error of a hypothesis, with its size; `None` if the hypothesis contains none.
+    /// Describes the error of the recording that a hypothesis assumes, with its size; `None` if it assumes none.
     pub(crate) fn found(suspect: &Suspect<'_>, hypothesis: &Hypothesis) -> Option<Self> {
         let (fault, size) = suspect.error_of(&hypothesis.model)?;
         if let Kind::Parameter(p) = fault.kind {

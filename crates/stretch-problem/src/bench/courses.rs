@@ -80,7 +80,8 @@ pub(crate) fn moving() -> Vec<Candidate> {
 mod tests {
     use super::*;
 
-    /// A limit of half the range per second. The number of samples is rounded, so the rate may be up to 2 % higher.
+    /// A limit of half the range per second. The number of samples of a move is rounded, so its rate may exceed the limit by up to
+    /// 2 %.
     #[test]
     fn a_paced_course_goes_the_same_way_no_faster_than_its_limit() {
         const DT_S: f64 = 0.01;

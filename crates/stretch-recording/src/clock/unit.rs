@@ -15,7 +15,7 @@ const USUAL_HZ: RangeInclusive<f64> = 1e-3..=1e6;
 const LIKELY_HZ: RangeInclusive<f64> = 0.5..=5e3;
 /// Seconds since 1970, from 1989 to 2103.
 const SINCE_1970_S: RangeInclusive<f64> = 6e8..=4.2e9;
-/// Day numbers of spreadsheets (from 1954 to 2119) and of MATLAB, and Julian days.
+/// Day numbers of spreadsheets (for the years 1954 to 2119) and of MATLAB, and Julian days.
 const DAYS: [RangeInclusive<f64>; 3] = [2e4..=8e4, 7e5..=7.8e5, 2.43e6..=2.5e6];
 /// Sample rate, Hz, above which a time that was taken for seconds may be in days.
 const DAYS_HZ: f64 = 1e4;

@@ -45,7 +45,7 @@ impl<T: Real> Repeats<T> {
         Self { held: T::nan(), count: 0 }
     }
 
-    /// Takes a sample, and returns the count of the held value, which is 1 for a new one.
+    /// Takes a sample, and returns how many samples in a row had its value: 1 if the value is new.
     /// `others_change` is whether any channel changed.
     #[inline(always)]
     pub fn step(&mut self, sample: T, others_change: bool) -> u16 {

@@ -1,7 +1,8 @@
 //! Landmarks of a movement that can be found without a reference: its two ends, and its rest.
 //!
 //! The low and the high end are the 5 % of the samples in which the reference, or an estimate of
-//! it, is smallest and largest. The rest is the 10 % in which the signals move least.
+//! it, is smallest and largest. The sensor counts as at rest in the 10 % of the samples in which the
+//! signals change least.
 
 use serde::{Deserialize, Serialize};
 use stretch_calibrate::toolkit::extent;

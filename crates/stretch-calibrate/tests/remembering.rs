@@ -133,6 +133,19 @@ fn auto_takes_a_model_that_remembers_where_that_shows() {
     assert!(chosen.rmse.unwrap() < 1.1 * best && simpler, "{chosen:?}");
 }
 
+/// A single larger movement lies outside the range of the other parts. Its clamped samples say nothing about a model.
+#[test]
+fn auto_does_not_judge_by_samples_that_only_the_part_left_out_reaches() {
+    let larger =
+        |t: f64| if (20.0..23.0).contains(&t) { 1.5 * (1.05 * (t - 20.0)).sin() } else { 0.0 };
+    let target = |t: f64| 0.5 * irregular(1.0)(t) + larger(t);
+    let choice = choose_model(&[trial("knee.csv", 60.0, target)], &Options::default()).unwrap();
+    let rmse_mm = |model: &str| choice.rows.iter().find(|row| row.model == model)?.rmse;
+    assert!(rmse_mm("observer").unwrap() < 0.3, "{choice:?}");
+    assert!(matches!(choice.model, ModelKind::Remembering { .. }), "{choice:?}");
+    assert!(choice.notes.iter().any(|note| note.contains("% of the samples did not count")));
+}
+
 #[test]
 fn auto_says_what_ramps_cannot() {
     let ramps: Vec<Trial> = [0.5, 1.0, 2.0, 4.0]

@@ -228,6 +228,16 @@ impl LinkStatus {
                  with --adc"
             );
         }
+        text += &self.comparison(frames);
+        if !self.connected {
+            text += "; waiting for the port";
+        }
+        text
+    }
+
+    /// Returns how the estimates of the board differ from those of the calibration, if they were compared.
+    fn comparison(&self, frames: u64) -> String {
+        let mut text = String::new();
         match self.compared {
             Some((0, _)) if frames > 0 => text += "; no estimate was compared with the calibration",
             Some((compared, difference)) if frames > 0 => {
@@ -248,9 +258,6 @@ impl LinkStatus {
                  here; reset the board to compare from its first frame on",
                 self.apart
             );
-        }
-        if !self.connected {
-            text += "; waiting for the port";
         }
         text
     }

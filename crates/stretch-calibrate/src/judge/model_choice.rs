@@ -218,16 +218,8 @@ pub fn choose_among(
         few if few < LEAST_TRIALS => "parts of the trials",
         _ => "trials",
     };
-    let mut notes = notes(trials, options, memory_shows);
-    let samples: usize = trials.iter().map(Trial::len).sum();
     let not_judged = found[bar].errors.as_ref().map_or(0, |errors| errors.not_judged);
-    let percent = (100.0 * not_judged as f64 / samples as f64).round();
-    if percent > 0.0 {
-        notes.push(format!(
-            "{percent} % of the samples did not count in the comparison, because their signal lies outside the range of the other {left_out}; \
-             move over the whole range several times, and calibrate again"
-        ));
-    }
+    let notes = notes(trials, options, memory_shows, (not_judged, left_out));
     Some(ModelChoice { rows, model, left_out, why, notes })
 }
 
@@ -256,7 +248,13 @@ fn is_length(options: &Options) -> bool {
     options.rest_length.is_some() || options.reference.starts_with("length")
 }
 
-fn notes(trials: &[Trial], options: &Options, memory_shows: bool) -> Vec<String> {
+/// Returns what the data cannot show. Of `not_judged` samples, the signal lies outside the range of the other `left_out`.
+fn notes(
+    trials: &[Trial],
+    options: &Options,
+    memory_shows: bool,
+    (not_judged, left_out): (usize, &str),
+) -> Vec<String> {
     let mut notes = Vec::new();
     if options.is_table {
         return notes;
@@ -275,6 +273,14 @@ fn notes(trials: &[Trial], options: &Options, memory_shows: bool) -> Vec<String>
             "the models were compared on {PARTS} parts of {}, each left out of the fit in turn; this does not show a drift between \
              sessions, and with {LEAST_TRIALS} trials or more, whole trials are left out instead",
             if trials.len() == 1 { "the trial" } else { "each trial" }
+        ));
+    }
+    let samples: usize = trials.iter().map(Trial::len).sum();
+    let percent = (100.0 * not_judged as f64 / samples as f64).round();
+    if percent > 0.0 {
+        notes.push(format!(
+            "{percent} % of the samples did not count in the comparison, because their signal lies outside the range of the other {left_out}; \
+             move over the whole range several times, and calibrate again"
         ));
     }
     notes

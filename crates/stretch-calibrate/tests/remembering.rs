@@ -2,8 +2,8 @@
 
 use approx::assert_relative_eq;
 use stretch_calibrate::{
-    Calibrated, Memory, ModelKind, Options, calibrate, choose_model, evaluate, read_calibration,
-    write_calibration,
+    Calibrated, Memory, ModelKind, Options, calibrate, choose_among, choose_model, evaluate,
+    judge_model, read_calibration, write_calibration,
 };
 use stretch_core::Model;
 use stretch_data::{Channel, Trial};
@@ -139,7 +139,12 @@ fn auto_does_not_judge_by_samples_that_only_the_part_left_out_reaches() {
     let larger =
         |t: f64| if (20.0..23.0).contains(&t) { 1.5 * (1.05 * (t - 20.0)).sin() } else { 0.0 };
     let target = |t: f64| 0.5 * irregular(1.0)(t) + larger(t);
-    let choice = choose_model(&[trial("knee.csv", 60.0, target)], &Options::default()).unwrap();
+    let (trials, options) = ([trial("knee.csv", 60.0, target)], Options::default());
+    let judged = ["linear", "observer"].map(|model| {
+        let kind: ModelKind = model.parse().unwrap();
+        (kind, judge_model(&trials, &options, kind).map_err(|error| error.to_string()))
+    });
+    let choice = choose_among(&trials, &options, judged.into()).unwrap();
     let rmse_mm = |model: &str| choice.rows.iter().find(|row| row.model == model)?.rmse;
     assert!(rmse_mm("observer").unwrap() < 0.3, "{choice:?}");
     assert!(matches!(choice.model, ModelKind::Remembering { .. }), "{choice:?}");

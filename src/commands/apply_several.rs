@@ -25,17 +25,23 @@ pub(super) fn apply_several(
     calibration: &ArrayCalibration<MAX_CHANNELS>,
     trial: &Path,
     out: Option<&Path>,
-    mut options: ReadOptions,
+    options: ReadOptions,
 ) -> anyhow::Result<()> {
-    for channel in &calibration.spec().channels {
-        options = options.require_with_gaps(channel.signal.as_str());
-    }
-    let trial = read_recording(trial, &options)?;
+    let trial = read_recording(trial, &require_gauges(options, calibration))?;
     let applied = apply_array(calibration, &trial)?;
     write_out(out, |out| write_all(calibration, &trial, &applied, out))?;
     warnings(calibration, &trial, &applied).for_each(doubt);
     report(&applied);
     Ok(())
+}
+
+/// Requires the columns of the gauges, each of which may lack samples.
+pub(super) fn require_gauges(
+    options: ReadOptions,
+    calibration: &ArrayCalibration<MAX_CHANNELS>,
+) -> ReadOptions {
+    let channels = calibration.spec().channels.iter();
+    channels.fold(options, |all, channel| all.require_with_gaps(channel.signal.as_str()))
 }
 
 /// Prints how many samples have an estimate, and of what quality.
@@ -84,47 +90,48 @@ pub(super) fn warnings<'a>(
 }
 
 /// Returns a sentence if a gauge begins to deviate from the other gauges and goes on to do so.
-fn shifts<'a>(
-    calibration: &'a ArrayCalibration<MAX_CHANNELS>,
-    trial: &'a str,
-    applied: &'a AppliedArray,
-) -> impl Iterator<Item = String> + 'a {
+fn shifts(
+    calibration: &ArrayCalibration<MAX_CHANNELS>,
+    trial: &str,
+    applied: &AppliedArray,
+) -> Option<String> {
     let unit = unit(calibration.spec().reference.as_str()).unwrap_or_default();
     // A gauge that was put on again stays shifted, whereas the memory of a sensor after a long hold fades. A shift therefore
     // counts from the first block after which most of the blocks show one, and names the gauges that all of these name.
     let is_shifted = |(_, shifts): &&(f64, Shifts<f64, MAX_CHANNELS>)| shifts.shifted != 0;
-    let lasts = |from: &usize| {
-        let after = &applied.shifts[*from..];
-        let shifted = after.iter().filter(is_shifted).count();
-        is_shifted(&&after[0]) && shifted > 1 && 2 * shifted > after.len()
+    let (mut shifted, mut first) = (0, None);
+    for (at, block) in applied.shifts.iter().enumerate().rev() {
+        if is_shifted(&block) {
+            shifted += 1;
+            let is_most = 2 * shifted > applied.shifts.len() - at;
+            first = if shifted > 1 && is_most { Some(at) } else { first };
+        }
+    }
+    let from = first?;
+    let (time_s, shifts) = &applied.shifts[from];
+    let run = applied.shifts[from..].iter().filter(is_shifted);
+    let suspects = run.fold(shifts.shifted, |all, (_, shifts)| {
+        if all & shifts.shifted == 0 { all } else { all & shifts.shifted }
+    });
+    let limits = &calibration.spec().shifts.as_ref()?.limits;
+    let channels = calibration.spec().channels.iter().enumerate();
+    let (at, names): (Vec<usize>, Vec<&str>) = channels
+        .filter(|(k, _)| suspects & (1 << k) != 0)
+        .map(|(k, channel)| (k, channel.signal.as_str()))
+        .unzip();
+    let beyond = |k: &usize| shifts.off[*k].abs() / limits[*k];
+    let k = at.into_iter().max_by(|a, b| beyond(a).total_cmp(&beyond(b)))?;
+    let name = calibration.spec().channels[k].signal.as_str();
+    let off = with_unit(shifts.off[k].abs(), unit);
+    let which = match &names[..] {
+        [_] => format!("{name} has shifted"),
+        several => format!("{} has shifted (the data cannot tell which)", several.join(" or ")),
     };
-    let first = (0..applied.shifts.len()).find(lasts);
-    first.into_iter().filter_map(move |from| {
-        let (time_s, shifts) = &applied.shifts[from];
-        let run = applied.shifts[from..].iter().filter(is_shifted);
-        let suspects = run.fold(shifts.shifted, |all, (_, shifts)| {
-            if all & shifts.shifted == 0 { all } else { all & shifts.shifted }
-        });
-        let limits = &calibration.spec().shifts.as_ref()?.limits;
-        let channels = calibration.spec().channels.iter().enumerate();
-        let (at, names): (Vec<usize>, Vec<&str>) = channels
-            .filter(|(k, _)| suspects & (1 << k) != 0)
-            .map(|(k, channel)| (k, channel.signal.as_str()))
-            .unzip();
-        let beyond = |k: &usize| shifts.off[*k].abs() / limits[*k];
-        let k = at.into_iter().max_by(|a, b| beyond(a).total_cmp(&beyond(b)))?;
-        let name = calibration.spec().channels[k].signal.as_str();
-        let off = with_unit(shifts.off[k].abs(), unit);
-        let which = match &names[..] {
-            [_] => format!("{name} has shifted"),
-            several => format!("{} has shifted (the data cannot tell which)", several.join(" or ")),
-        };
-        Some(format!(
-            "{trial}: at {time_s:.2} s, {which}: the estimate from {name} alone differs by at least {off} from that of the other gauges; in the \
-             calibration it differed by up to {}. If the gauge was put on again, calibrate again",
-            with_unit(limits[k], unit)
-        ))
-    })
+    Some(format!(
+        "{trial}: at {time_s:.2} s, {which}: the estimate from {name} alone differs by at least {off} from that of the other gauges; in the \
+         calibration it differed by up to {}. If the gauge was put on again, calibrate again",
+        with_unit(limits[k], unit)
+    ))
 }
 
 fn write_all(

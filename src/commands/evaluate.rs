@@ -14,7 +14,7 @@ use stretch_sleeve::{
 };
 
 use super::{
-    apply_several::warnings,
+    apply_several::{require_gauges, warnings},
     json::Json,
     reading::{Recorded, read_trials, with_columns_to_name},
     shared::{say_below, say_first, short_name, with_unit},
@@ -75,9 +75,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     }
     for (_, calibration) in &several {
         columns = columns.require(calibration.spec().reference.as_str());
-        for channel in &calibration.spec().channels {
-            columns = columns.require_with_gaps(channel.signal.as_str());
-        }
+        columns = require_gauges(columns, calibration);
     }
     let renamed = "a calibration needs the columns that it was fitted to: rename them, and convert their units, with stretch convert --column NEW=OLD*FACTOR";
     let trials = read_trials(&args.trials, Split::Test, &columns)
@@ -132,6 +130,10 @@ fn array_doubts(
         let doubts = Doubt::of_method(evaluation, method, spec.all.sd, spec.reference.as_str());
         all.extend(doubts.into_iter().chain(outside).map(|doubt| doubt.of(&errors.method)));
     }
+    // If all together are not shifted, a gauge that is off alone may only have been calibrated on too little.
+    if !all.iter().any(|doubt| doubt.code == SHIFTED) {
+        return all;
+    }
     let alone = specs().flat_map(|spec| spec.alone.iter().map(move |gains| (spec, gains.sd)));
     let shifted = (calibrations.len()..).zip(alone).filter(|(method, (spec, sd))| {
         let doubts = Doubt::of_method(evaluation, *method, *sd, spec.reference.as_str());
@@ -143,7 +145,6 @@ fn array_doubts(
         Some(format!("{} {}", worst.method, with_unit(worst.bias, &evaluation.unit)))
     });
     let shifted: Vec<String> = shifted.collect();
-    // A gauge whose own estimate is shifted may have been calibrated on too little to be used alone.
     if !shifted.is_empty() {
         let alone = format!("; the estimates of single gauges are off by: {}", shifted.join(", "));
         all.iter_mut().filter(|doubt| doubt.code == SHIFTED).for_each(|doubt| doubt.text += &alone);

@@ -11,6 +11,7 @@ use clap::ArgGroup;
 use stretch_calibrate::{FIXED_STEP, FixedRecord, change_per_code, fixed_record, parse_adc};
 use stretch_core::Calibration;
 use stretch_data::{
+    after_number,
     files::{FileError, Outputs, is_standard_output, write_whole},
     in_digits,
 };
@@ -148,8 +149,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
 /// Returns the mean change of the estimate per code, in brackets.
 fn per_code(calibration: &Calibration, adc: &Adc) -> String {
     let change = in_digits(change_per_code(calibration, adc), 2);
-    let change = format!("{change} {}", calibration.spec().reference.unit());
-    format!(" (one code changes the estimate by {} on average)", change.trim_end())
+    let unit = after_number(calibration.spec().reference.unit());
+    format!(" (one code changes the estimate by {change}{unit} on average)")
 }
 
 /// Returns what to know about the converter of a header. A step in `float` takes the signal itself, so that a header

@@ -111,6 +111,20 @@ impl Model {
         }
     }
 
+    /// Returns whether an estimate depends on samples before the window of the rate: the model has states that follow the
+    /// signal. Two receptors with other states then differ until these have faded.
+    ///
+    /// ```
+    /// use stretch_core::{FitSummary, Interval, LinearMap, Model};
+    /// let signal_domain = Interval { min: 1.0, max: 2.0 };
+    /// let fit = FitSummary { samples: 100, r_squared: 0.9, rmse: 0.1 };
+    /// let line = LinearMap { slope: 1.0, intercept: 0.0, signal_domain, fit };
+    /// assert!(!Model::Linear(line).has_memory());
+    /// ```
+    pub fn has_memory(&self) -> bool {
+        matches!(self, Self::History(_) | Self::Observer(_) | Self::Diagnosed(_))
+    }
+
     /// Returns the root mean square error of the fit in normalised target, the larger one of two branches; infinite for
     /// a removed kind.
     ///

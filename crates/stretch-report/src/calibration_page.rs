@@ -19,7 +19,7 @@ use super::{
     estimate_figure::{closest_look, estimate_figure},
     first_seconds::headline,
     markup::{fixed, number, with_unit},
-    memory_figure::{loop_figure, remembers, step_figure},
+    memory_figure::{loop_figure, step_figure},
     page::Page,
     signal_figure::{AT_REST, signal_figure},
     subject::Subject,
@@ -340,7 +340,8 @@ fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
 }
 
 fn shapes(page: &mut Page, calibrated: &[(&str, &Calibrated)], unit: &str) {
-    let memories: Vec<_> = calibrated.iter().filter(|(_, c)| remembers(c)).collect();
+    let memories: Vec<_> =
+        calibrated.iter().filter(|(_, c)| c.calibration.spec().model.has_memory()).collect();
     for (name, calibrated) in &memories {
         page.section(
             &format!("What it remembers ({name})"),

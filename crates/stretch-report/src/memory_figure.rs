@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 use stretch_calibrate::{Calibrated, LiveReceptor};
-use stretch_core::{Calibration, Model};
+use stretch_core::Calibration;
 
 use super::{
     canvas::Ink,
@@ -17,14 +17,6 @@ const HOLD_S: f64 = 5.0;
 /// Periods of the triangles, slow to fast, s.
 const PERIODS_S: [f64; 3] = [16.0, 4.0, 1.0];
 const INKS: [Ink; 3] = [Ink::Low, Ink::Middle, Ink::High];
-
-/// Whether an estimate depends on more than the signal and its rate.
-pub(crate) fn remembers(calibrated: &Calibrated) -> bool {
-    matches!(
-        calibrated.calibration.spec().model,
-        Model::History(_) | Model::Observer(_) | Model::Diagnosed(_)
-    )
-}
 
 /// A signal on its grid of time, and the calibration's estimates; NaN where there is no estimate.
 struct Answer {

@@ -73,13 +73,11 @@ pub(super) fn without_estimate<'a>(trials: impl Iterator<Item = &'a [f64]>) -> O
         missing += after.filter(|estimate| estimate.is_nan()).count();
         all += estimates.len();
     }
-    let percent = (100.0 * missing as f64 / all as f64).round();
-    let text = (percent > 0.0).then(|| {
-        format!(
-            "{percent} % of the samples have no estimate, and the errors are those of the others"
-        )
-    });
-    text.map(|text| Doubt::new("without_estimate", text))
+    let percent = whole_percent(missing, all)?;
+    let text = format!(
+        "{percent} % of the samples have no estimate, and the errors are those of the others"
+    );
+    Some(Doubt::new("without_estimate", text))
 }
 
 /// Returns a doubt for estimates with a larger error than the mean of the reference.
@@ -217,6 +215,11 @@ pub fn fitted_trials(provenance: &Provenance, columns: &[&str], trials: &[Trial]
         )
     });
     text.map(|text| Doubt::new("fitted_trials", text))
+}
+
+/// Returns a share in whole percent; `None` if it is less than half a percent.
+pub(super) fn whole_percent(part: usize, of: usize) -> Option<f64> {
+    Some((100.0 * part as f64 / of as f64).round()).filter(|percent| *percent > 0.0)
 }
 
 /// Returns a share in percent. It is 100 only if `part` equals `of`.

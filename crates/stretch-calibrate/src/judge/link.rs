@@ -3,7 +3,7 @@
 
 use std::io::Write;
 
-use stretch_core::{Branch, Calibration, Model, RateEstimator, Runner, Target, Volts};
+use stretch_core::{Branch, Calibration, RateEstimator, Runner, Target, Volts};
 use stretch_data::push_number;
 use stretch_link::{Answer, Counts, Decoder, Event, Frame, TimeLine};
 use stretch_receptor::{
@@ -76,7 +76,7 @@ impl Twin {
             unit: spec.reference.unit().to_owned(),
             period_s: Some(spec.sample_rate_hz.period_s()),
             target: Some(spec.target),
-            remembers: !matches!(spec.model, Model::Linear(_) | Model::Surfaces { .. }),
+            remembers: spec.model.has_memory(),
             receptor,
         })
     }

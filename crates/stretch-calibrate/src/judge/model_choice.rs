@@ -15,6 +15,7 @@ use crate::{
 };
 
 use super::{
+    acceptance::whole_percent,
     left_out::{Errors, Judged, PARTS, excess, judge_model, turning},
     model_words::{Grounds, why},
 };
@@ -276,8 +277,7 @@ fn notes(
         ));
     }
     let samples: usize = trials.iter().map(Trial::len).sum();
-    let percent = (100.0 * not_judged as f64 / samples as f64).round();
-    if percent > 0.0 {
+    if let Some(percent) = whole_percent(not_judged, samples) {
         notes.push(format!(
             "{percent} % of the samples did not count in the comparison, because their signal lies outside the range of the other {left_out}; \
              move over the whole range several times, and calibrate again"

@@ -7,7 +7,9 @@ use schemars::{JsonSchema, Schema, generate::SchemaSettings, transform::Recursiv
 use serde::Serialize;
 use serde_json::{Value, json};
 use stretch_data::{RigFile, Trial};
-use stretch_gap::{Diagnosis, EffectValue, Evidence, GapError, Note, Options, diagnose};
+use stretch_gap::{
+    Diagnosis, EffectValue, Evidence, GapError, Note, Options, diagnose, next_experiment,
+};
 use stretch_sim::{Quantity, Sketch};
 
 use crate::{
@@ -47,7 +49,7 @@ impl Problem {
     /// [`diagnose`].
     ///
     /// # Errors
-    /// Those of [`diagnose`] and [`next_experiment`](stretch_gap::next_experiment).
+    /// Those of [`diagnose`] and [`next_experiment`].
     ///
     /// ```
     /// # use stretch_data::{Channel, SessionTrial, Trial};
@@ -99,7 +101,12 @@ impl Problem {
         let mut proposal = None;
         if diagnosis.ambiguous.len() > 1 && looks_on {
             report("looking for the next experiment");
-            proposal = source.next(&diagnosis, &evidence)?;
+            proposal = match next_experiment(source, &diagnosis, &evidence) {
+                // There is no prediction if the run budget is spent or a model cannot be run on other
+                // inputs.
+                Err(error) if error.is_of_runs() => None,
+                proposal => proposal?,
+            };
         }
         diagnosis.set_next_experiment(proposal.as_ref().map(|p| p.next.clone()));
         let notes = &mut diagnosis.notes;

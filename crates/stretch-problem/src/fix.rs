@@ -1,11 +1,11 @@
 //! The fix of a simulator: a file that contains the findings of a diagnosis.
 
-use std::{f64::consts::TAU, path::Path};
+use std::path::Path;
 
 use stretch_data::{Remarks, RigFile, after_number, in_digits};
 use stretch_effects::EffectParameter;
 use stretch_gap::{Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Model, VerdictKind};
-use stretch_sim::{Effect, SimError, Tolerance};
+use stretch_sim::{SimError, Tolerance};
 
 use crate::black_box::ProblemSpec;
 
@@ -43,20 +43,6 @@ impl Fix {
             Fixed::Rig(rig) => rig.to_toml_with(&self.remarks),
             Fixed::Problem(problem) => problem.to_toml_with(path, &self.remarks),
         }
-    }
-}
-
-/// An effect of a fix, described in words.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Meaning<'a> {
-    pub(crate) name: &'a str,
-    pub(crate) words: &'a str,
-    pub(crate) equation: &'a str,
-}
-
-impl From<&Effect> for Meaning<'static> {
-    fn from(effect: &Effect) -> Self {
-        Self { name: effect.name, words: effect.words, equation: effect.equation }
     }
 }
 
@@ -188,10 +174,9 @@ impl<'a> Chosen<'a> {
         lines
     }
 
-    /// Adds the comments on an effect and its parameters.
-    pub(crate) fn describe(&self, effect: Meaning<'_>, remarks: &mut Remarks) {
-        let name = effect.name;
-        remarks.effects.insert(name.into(), self.lines(effect));
+    /// Adds the comments on an effect, which is described `in_words` and by its equation, and on its parameters.
+    pub(crate) fn describe(&self, name: &str, in_words: [&str; 2], remarks: &mut Remarks) {
+        remarks.effects.insert(name.into(), self.lines(name, in_words));
         for p in self.numbers(name) {
             let key = (name.to_owned(), p.name.clone());
             remarks.parameters.insert(key, effect_remark(&p));
@@ -204,11 +189,11 @@ impl<'a> Chosen<'a> {
         all.filter(|p| p.effect == effect).cloned().collect()
     }
 
-    fn lines(&self, effect: Meaning<'_>) -> Vec<String> {
+    fn lines(&self, effect: &str, [words, equation]: [&str; 2]) -> Vec<String> {
         let d = self.diagnosis;
-        let share = d.shares.iter().find(|s| s.effect == effect.name);
+        let share = d.shares.iter().find(|s| s.effect == effect);
         let closes = share.map_or(String::new(), |s| format!(" closes {:.0} %", 100.0 * s.closes));
-        let faint = match d.faint.iter().any(|name| name == effect.name) {
+        let faint = match d.faint.iter().any(|name| name == effect) {
             true => ", faint, and kept because the parameters were fitted together with it",
             false => "",
         };
@@ -219,13 +204,13 @@ impl<'a> Chosen<'a> {
             format!("{what} {low:.0} to {high:.0} %{end}; probability {:.2}", c.probability)
         });
         let mut lines = vec![
-            effect.words.to_owned(),
+            words.to_owned(),
             format!(
                 "Found by diagnosis{faint}:{closes} of the gap on trials that were not fitted{set}."
             ),
-            effect.equation.to_owned(),
+            equation.to_owned(),
         ];
-        if !d.tied.is_empty() && d.named.iter().any(|name| name == effect.name) {
+        if !d.tied.is_empty() && d.named.iter().any(|name| name == effect) {
             lines.push(format!("These data cannot rule out {}.", d.tied.join(", ")));
         }
         lines
@@ -242,63 +227,4 @@ fn effect_remark(p: &EffectValue) -> String {
     let [low, high] = p.interval.map(|x| in_digits(x, 4));
     let form = if p.is_form { "form; " } else { "" };
     format!("{form}95 %: {low} .. {high}{}", after_number(&p.unit))
-}
-
-/// Time over which the phase of the mains is assumed constant, s.
-const STEADY_S: f64 = 1.0;
-
-/// Amplitude and phase of a sine that is fitted to pairs of time (s) and value. One sine is fitted to all samples, and
-/// one to each second. If the sine of all samples has at least half of the mean power of the sines of the seconds, its
-/// amplitude and phase are returned. Otherwise the amplitude is the root of that mean power, and the phase is that of
-/// the sine of all samples.
-///
-/// If the sample rate is twice the frequency, one quadrature cannot be observed and counts as zero.
-pub(crate) fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {
-    let of = |part: &[(f64, f64)]| -> [f64; 2] {
-        let mut sums = [0.0; 5];
-        for (t, r) in part {
-            let turns = hertz * t;
-            let (sin, cos) = (TAU * (turns - turns.floor())).sin_cos();
-            let products = [cos * cos, cos * sin, sin * sin, r * cos, r * sin];
-            sums.iter_mut().zip(products).for_each(|(sum, x)| *sum += x);
-        }
-        let [cc, cs, ss, rc, rs] = sums;
-        // A quadrature that cannot be observed has no power, which would make the matrix singular:
-        // a millionth of the total power is added.
-        let ridge = 1e-6 * (cc + ss) + f64::MIN_POSITIVE;
-        let (cc, ss) = (cc + ridge, ss + ridge);
-        let determinant = cc * ss - cs * cs;
-        [(rc * ss - rs * cs) / determinant, (rs * cc - rc * cs) / determinant]
-    };
-    let power = |[p, q]: [f64; 2]| p * p + q * q;
-    let whole = of(left);
-    let seconds: Vec<f64> = left
-        .chunk_by(|a, b| (a.0 / STEADY_S).floor() == (b.0 / STEADY_S).floor())
-        .map(|part| power(of(part)))
-        .collect();
-    let mean = seconds.iter().sum::<f64>() / seconds.len().max(1) as f64;
-    let amplitude = if power(whole) >= 0.5 * mean { power(whole) } else { mean }.sqrt();
-    [amplitude, whole[0].atan2(whole[1])]
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use approx::assert_abs_diff_eq;
-
-    #[test]
-    fn a_sine_is_found_with_a_steady_or_a_drifting_phase() {
-        let wave = |hertz: f64, phase: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
-            let at = |i: u32| 0.01 * f64::from(i);
-            (0..1000).map(at).map(|t| (t, 0.02 * (TAU * hertz * t + phase(t)).sin())).collect()
-        };
-        let [a, phase] = sine(60.0, &wave(60.0, &|_| 1.0));
-        assert_abs_diff_eq!(a, 0.02, epsilon = 1e-6);
-        assert_abs_diff_eq!(phase, 1.0, epsilon = 1e-4);
-        // At a sample rate of twice the frequency, only the sine of the phase can be observed.
-        let [a, phase] = sine(50.0, &wave(50.0, &|_| 0.7));
-        assert_abs_diff_eq!(a * phase.sin(), 0.02 * 0.7_f64.sin(), epsilon = 1e-6);
-        let [a, _] = sine(60.0, &wave(60.0, &|t| 2.0 * t));
-        assert!(a > 0.015, "{a}");
-    }
 }

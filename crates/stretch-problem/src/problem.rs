@@ -2,15 +2,15 @@
 
 use std::{fmt::Debug, num::NonZeroUsize, path::Path, sync::Arc};
 
-use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator};
+use stretch_gap::{Diagnosis, EffectSpec, Evidence, Laboratory, Model, Simulator};
 use stretch_recording::ReadOptions;
-use stretch_sim::Catalogue;
+use stretch_sim::{Catalogue, Sketch};
 
 use crate::{
     black_box::{BlackBox, ProblemSpec},
     error::ProblemError,
     file::IN_FOLDER,
-    fix::{Fix, NoFix},
+    fix::{Chosen, Fix, NoFix},
     gauge::GaugeSimulator,
     implement::Implementation,
     rig::RigSimulator,
@@ -20,7 +20,7 @@ use crate::{
 
 /// A simulator with its recordings that provides everything [`Problem::examine`] needs. A new kind
 /// of simulator implements this trait.
-pub trait Diagnosable: Simulator + Debug + Send {
+pub trait Diagnosable: Laboratory + Debug + Send {
     /// Notes on what was done to the recordings and which effects are not looked for, in sentences.
     fn notes(&self) -> Vec<String>;
 
@@ -32,19 +32,25 @@ pub trait Diagnosable: Simulator + Debug + Send {
     /// A recorded column by its name, all trials concatenated.
     fn column(&self, name: &str) -> Option<Vec<f64>>;
 
-    /// The experiment that would distinguish the alternatives of a diagnosis; `None` if no
-    /// candidate experiment distinguishes them, or if the simulator cannot predict experiments.
-    ///
-    /// # Errors
-    /// The errors of the simulator.
-    fn next(
-        &self,
-        diagnosis: &Diagnosis,
-        evidence: &Evidence,
-    ) -> Result<Option<Proposal>, GapError>;
+    /// What an effect of the catalogue does, in words, and its equation.
+    fn in_words(&self, effect: usize) -> [&str; 2];
+
+    /// Code for an effect of the catalogue with these values, in the simulator re-tuned as in a model.
+    fn sketch(&self, effect: usize, values: &[f64], model: &Model) -> Option<Sketch>;
 
     /// Code for the effects that a diagnosis names, for the user to copy into the simulator.
-    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation>;
+    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
+        let Ok(chosen) = Chosen::of(diagnosis, evidence) else { return Vec::new() };
+        let effects = &self.description().effects;
+        let one = |(effect, values): (usize, &[f64])| {
+            let EffectSpec { name, stage, .. } = &effects[effect];
+            let [words, formula] = self.in_words(effect).map(str::to_owned);
+            let (name, stage, numbers) = (name.clone(), stage.clone(), chosen.numbers(name));
+            let sketch = self.sketch(effect, values, chosen.model);
+            Implementation { name, words, stage, formula, numbers, sketch }
+        };
+        chosen.named(effects).into_iter().map(one).collect()
+    }
 
     /// The fixed simulator, as a file.
     ///

@@ -209,8 +209,8 @@ fn an_experiment_drives_both_joints_at_once() {
     let mut values = effects[dead_zone].starts[0].clone();
     values[0] = DEAD.hip;
     let model = Model { parameters: SHIPPED.into(), effects: vec![(dead_zone, values)] };
-    let (plan, course) = bench.experiments().remove(0);
-    let predicted = bench.predict(&model, &course).expect("a prediction");
+    let plan = bench.experiments().remove(0);
+    let predicted = bench.predict(&model, &plan.trial).expect("a prediction");
     let command = |name: &str| plan.trial.channel(name).expect("a column").to_vec();
     let hip: Vec<f64> = command("hip_V").iter().map(|u| u - u.clamp(-DEAD.hip, DEAD.hip)).collect();
     let angles = leg(&SHIPPED, CARRIED, [&hip, &command("knee_V")]);

@@ -88,15 +88,15 @@ fn models(simulator: &dyn Simulator, effect: usize) -> Vec<Model> {
 }
 
 /// Effects that change no candidate experiment at any point at which the search for them begins.
-fn unseen<L: Laboratory>(simulator: &L) -> Vec<String> {
+fn unseen(simulator: &dyn Laboratory) -> Vec<String> {
     let candidates = simulator.experiments();
     let nominal = Model::nominal(simulator);
     let before: Vec<_> =
-        candidates.iter().map(|(_, x)| simulator.predict(&nominal, x).unwrap()).collect();
+        candidates.iter().map(|x| simulator.predict(&nominal, &x.trial).unwrap()).collect();
     let is_seen = |effect: usize| {
         models(simulator, effect).iter().any(|model| {
             let mut all = candidates.iter().zip(&before);
-            all.any(|((_, x), before)| simulator.predict(model, x).unwrap() != *before)
+            all.any(|(x, before)| simulator.predict(model, &x.trial).unwrap() != *before)
         })
     };
     let names = simulator.description().effects.iter().enumerate();

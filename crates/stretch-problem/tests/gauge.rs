@@ -5,7 +5,7 @@ use crate::support::rows::{PROBABILITY, with_lost_rows};
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial};
 use stretch_gap::{
-    Diagnosis, Laboratory, Options, Simulator, VerdictKind, diagnose, next_experiment,
+    Diagnosis, Laboratory, Options, Plan, Simulator, VerdictKind, diagnose, next_experiment,
 };
 use stretch_problem::{GaugeSetup, GaugeSimulator, ProblemError, in_words};
 use stretch_sim::{Catalogue, GaugeRig};
@@ -319,10 +319,10 @@ fn no_experiment_moves_faster_than_the_recording() {
     };
     let rod = |trial: &Trial, name: &str| fastest(trial.channel(name).expect("a column"));
     let recorded = trials.iter().map(|t| rod(&t.trial, "rod_mm")).fold(0.0, f64::max);
-    for (plan, _) in gauge.experiments() {
+    for Plan { trial, .. } in gauge.experiments() {
         // A motion takes a whole number of samples, so that its rate may be some percent higher.
-        let proposed = rod(&plan.trial, "set_rod_mm");
-        assert!(proposed < 1.05 * recorded, "{}: {proposed}, not {recorded}", plan.name);
+        let proposed = rod(&trial, "set_rod_mm");
+        assert!(proposed < 1.05 * recorded, "{}: {proposed}, not {recorded}", trial.name);
     }
 }
 

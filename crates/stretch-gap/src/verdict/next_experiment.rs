@@ -40,13 +40,11 @@ const SMALL: f64 = 0.02;
 /// A candidate experiment: a description, and the trial that performs it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
-    /// Name of the experiment.
-    pub name: String,
     /// A sentence that says how the experiment is done.
     pub how: String,
     /// Time to prepare the experiment, minutes.
     pub prepare_min: f64,
-    /// The commands and the quantities imposed from outside, evenly sampled.
+    /// The commands and the quantities imposed from outside, evenly sampled. Its name is that of the experiment.
     pub trial: Trial,
 }
 
@@ -65,20 +63,18 @@ impl Plan {
     }
 }
 
-/// A simulator that can predict the outcome of experiments that have not been done yet.
+/// A simulator that can predict the outcome of experiments that have not been done yet. A trial describes an experiment
+/// completely.
 pub trait Laboratory: Simulator {
-    /// The data needed to simulate an experiment.
-    type Setting: Sync;
     /// Experiments to choose from, all with the same sample time.
-    fn experiments(&self) -> Vec<(Plan, Self::Setting)>;
-    /// An experiment that represents the data measured so far.
-    fn done(&self) -> Self::Setting;
-    /// Returns the prediction of a model for an experiment: every recorded channel in units of its
-    /// noise.
+    fn experiments(&self) -> Vec<Plan>;
+    /// A trial that represents the data measured so far.
+    fn done(&self) -> Trial;
+    /// Returns the prediction of a model for a trial: every recorded channel in units of its noise.
     ///
     /// # Errors
     /// The simulation is not possible with these values.
-    fn predict(&self, model: &Model, setting: &Self::Setting) -> Result<Vec<Vec<f64>>, GapError>;
+    fn predict(&self, model: &Model, trial: &Trial) -> Result<Vec<Vec<f64>>, GapError>;
 }
 
 /// The recommended experiment, and the trial that performs it.
@@ -107,8 +103,8 @@ pub struct Proposal {
 ///
 /// # Errors
 /// Errors of the simulator.
-pub fn next_experiment<L: Laboratory>(
-    simulator: &L,
+pub fn next_experiment(
+    simulator: &dyn Laboratory,
     diagnosis: &Diagnosis,
     evidence: &Evidence,
 ) -> Result<Option<Proposal>, GapError> {
@@ -118,24 +114,25 @@ pub fn next_experiment<L: Laboratory>(
     let experiments = simulator.experiments();
     let rated = rate(simulator, one, two, &experiments)?.into_iter().enumerate();
     let value = |&(i, d): &(usize, f64)| {
-        let plan = &experiments[i].0;
+        let plan = &experiments[i];
         d * d * plan.runs_min() / plan.minutes()
     };
     let mut rated: Vec<(usize, f64)> = rated.collect();
     rated.sort_by(|a, b| value(b).total_cmp(&value(a)));
     let Some(&(best, d)) = rated.first().filter(|r| r.1.is_finite()) else { return Ok(None) };
-    let chosen = &experiments[best].0;
+    let chosen = &experiments[best];
     let repeats = repeats(d, chosen.runs_min());
     let next = NextExperiment {
-        name: chosen.name.clone(),
+        name: chosen.trial.name.clone(),
         separates: if repeats.is_some() { separates } else { Vec::new() },
         d,
         minutes: chosen.minutes(),
         why: repeats.map_or(HOPELESS.to_owned(), |more| chosen.how.clone() + &more),
     };
     let trial = chosen.trial.clone();
-    let rated =
-        rated.iter().map(|&(i, d)| (experiments[i].0.name.clone(), d, experiments[i].0.minutes()));
+    let named =
+        |&(i, d): &(usize, f64)| (experiments[i].trial.name.clone(), d, experiments[i].minutes());
+    let rated = rated.iter().map(named);
     Ok(Some(Proposal { next, trial, experiments: rated.collect() }))
 }
 
@@ -144,32 +141,29 @@ pub fn next_experiment<L: Laboratory>(
 ///
 /// # Errors
 /// Errors of the simulator.
-pub fn differences<L: Laboratory>(
-    simulator: &L,
+pub fn differences(
+    simulator: &dyn Laboratory,
     one: &Model,
     two: &Model,
 ) -> Result<Vec<(String, f64)>, GapError> {
     let experiments = simulator.experiments();
     let rated = rate(simulator, one, two, &experiments)?;
-    Ok(experiments.into_iter().map(|(plan, _)| plan.name).zip(rated).collect())
+    Ok(experiments.into_iter().map(|plan| plan.trial.name).zip(rated).collect())
 }
 
-fn rate<L: Laboratory>(
-    simulator: &L,
+fn rate(
+    simulator: &dyn Laboratory,
     one: &Model,
     two: &Model,
-    experiments: &[(Plan, L::Setting)],
+    experiments: &[Plan],
 ) -> Result<Vec<f64>, GapError> {
     let done = simulator.done();
-    let block = experiments.first().map_or(1.0, |(plan, _)| BLOCK_S / plan.dt_s());
+    let block = experiments.first().map_or(1.0, |plan| BLOCK_S / plan.dt_s());
     let known = [Tangent::of(simulator, one, &done)?, Tangent::of(simulator, two, &done)?];
     experiments
         .par_iter()
-        .map(|(_, experiment)| {
-            let here = [
-                Tangent::of(simulator, one, experiment)?,
-                Tangent::of(simulator, two, experiment)?,
-            ];
+        .map(|Plan { trial, .. }| {
+            let here = [Tangent::of(simulator, one, trial)?, Tangent::of(simulator, two, trial)?];
             let there = left(block, &known[0], &known[1], &here[0], &here[1]);
             let back = left(block, &known[1], &known[0], &here[1], &here[0]);
             Ok(there.min(back))
@@ -222,13 +216,9 @@ struct Tangent {
 }
 
 impl Tangent {
-    fn of<L: Laboratory>(
-        simulator: &L,
-        model: &Model,
-        experiment: &L::Setting,
-    ) -> Result<Self, GapError> {
+    fn of(simulator: &dyn Laboratory, model: &Model, trial: &Trial) -> Result<Self, GapError> {
         let run = |model: &Model| -> Result<(Vec<f64>, usize), GapError> {
-            let channels = simulator.predict(model, experiment)?;
+            let channels = simulator.predict(model, trial)?;
             let count = channels.len();
             Ok((channels.into_iter().flatten().collect(), count))
         };
@@ -410,7 +400,7 @@ mod tests {
     fn a_plan_takes_its_samples_and_its_preparation() {
         let time_s: Vec<f64> = (0..6000).map(|i| 0.01 * f64::from(i)).collect();
         let trial = Trial { time_s, ..Trial::default() };
-        let plan = Plan { name: "slow".into(), how: "slowly.".into(), prepare_min: 2.0, trial };
+        let plan = Plan { how: "slowly.".into(), prepare_min: 2.0, trial };
         assert_relative_eq!(plan.minutes(), 3.0, epsilon = 0.0, max_relative = 1e-6);
     }
 }

@@ -22,17 +22,17 @@ pub(crate) fn levels(samples: usize) -> Vec<f64> {
 }
 
 /// An experiment that drives the first stage by x and needs `prepare_min` minutes of preparation.
-fn plan(name: &str, prepare_min: f64, x: Vec<f64>) -> (Plan, Vec<f64>) {
-    let channels = vec![Channel { name: "x".into(), values: x.clone() }];
+fn plan(name: &str, prepare_min: f64, x: Vec<f64>) -> Plan {
+    Plan { how: "Move it.".into(), prepare_min, trial: trial(name, x) }
+}
+
+fn trial(name: &str, x: Vec<f64>) -> Trial {
     let time_s = (0..x.len()).map(|i| 0.01 * i as f64).collect();
-    let trial = Trial { name: name.into(), time_s, channels };
-    (Plan { name: name.into(), how: "Move it.".into(), prepare_min, trial }, x)
+    Trial { name: name.into(), time_s, channels: vec![Channel { name: "x".into(), values: x }] }
 }
 
 impl Laboratory for Measured {
-    type Setting = Vec<f64>;
-
-    fn experiments(&self) -> Vec<(Plan, Vec<f64>)> {
+    fn experiments(&self) -> Vec<Plan> {
         let sweep: Vec<f64> = (0..3000).map(|i| (0.004 * f64::from(i)).sin()).collect();
         vec![
             plan("three levels", 0.0, levels(3000)),
@@ -42,11 +42,12 @@ impl Laboratory for Measured {
         ]
     }
 
-    fn done(&self) -> Vec<f64> {
-        self.x.clone()
+    fn done(&self) -> Trial {
+        trial("done", self.x.clone())
     }
 
-    fn predict(&self, model: &Model, x: &Vec<f64>) -> Result<Vec<Vec<f64>>, GapError> {
+    fn predict(&self, model: &Model, trial: &Trial) -> Result<Vec<Vec<f64>>, GapError> {
+        let x = trial.channel("x").expect("a motion");
         let toy = &self.toy;
         let specs = toy.parameters.iter().zip(&model.parameters);
         let parameters: Vec<f64> = specs.map(|(p, x)| x / unit(&p.unit, toy.units)).collect();

@@ -1,18 +1,14 @@
-//! Results of a diagnosis of a built-in simulator: notes, the next experiment, code for effects, and the fixed rig
-//! file.
+//! Results of a diagnosis of a built-in simulator: notes, code for effects, and the fixed rig file.
 
 use std::fmt::Debug;
 
 use stretch_data::{Remarks, RigFile};
-use stretch_gap::{
-    Diagnosis, Evidence, GapError, Laboratory, Model, Proposal, Run, next_experiment,
-};
-use stretch_sim::{Effect, EffectSet, Grid, Surroundings};
+use stretch_gap::{Diagnosis, Evidence, Laboratory, Model};
+use stretch_sim::{Effect, EffectSet, Grid, Sketch, Surroundings};
 
 use super::Bench;
 use crate::{
-    fix::{Chosen, Fix, Fixed, NoFix, names, sine},
-    implement::Implementation,
+    fix::{Chosen, Fix, Fixed, NoFix, names},
     problem::Diagnosable,
 };
 
@@ -23,9 +19,6 @@ pub(crate) trait BuiltIn: Laboratory {
 
     /// The surroundings of an effect in the simulator, re-tuned as in a model.
     fn surroundings<'a>(&self, model: &Model, grid: &'a Grid) -> Surroundings<'a>;
-
-    /// Size of a spectral line of unit amplitude in the sensor's signal.
-    fn line_unit(&self, model: &Model) -> f64;
 
     /// Values of an effect within the limits of a file, because rounding may put a value outside of its range.
     fn within(_: &Effect, values: &[f64]) -> Vec<f64> {
@@ -50,29 +43,6 @@ pub(crate) trait BuiltIn: Laboratory {
     }
 }
 
-/// Replaces the amplitude and phase of an effect's spectral line by values from the recording, as a
-/// diagnosis does. They are the amplitude and phase of the residual of the model without the
-/// effect, over the samples outside the test samples. An effect without a line keeps its values.
-fn complete<B: BuiltIn>(own: &B, model: &Model, effect: &Effect, values: Vec<f64>) -> Vec<f64> {
-    let Bench { about, columns, rows, sensor, .. } = own.bench();
-    let Some(line) = effect.line(&values) else { return values };
-    let mut without = model.clone();
-    without.effects.retain(|(index, _)| rows[*index].name != effect.name);
-    let (measured, unit) = (own.measured(*sensor), own.line_unit(model));
-    let mut simulated = vec![0.0; measured.len()];
-    let run = Run::exact(*sensor, &without, about.trials.len());
-    if own.simulate(run, &mut simulated).is_err() {
-        return values;
-    }
-    let mut left = Vec::new();
-    for (trial, range) in about.trials.iter().zip(columns.fitted()) {
-        let at = |i: usize| trial.start_s + (i - range.start) as f64 * about.dt_s;
-        left.extend(range.clone().map(|i| (at(i), (measured[i] - simulated[i]) / unit)));
-    }
-    let [amplitude, phase] = sine(line.hertz, &left);
-    [&[amplitude], values.get(1..).unwrap_or(&[]), &[phase]].concat()
-}
-
 impl<B: BuiltIn + Debug + Send> Diagnosable for B {
     fn notes(&self) -> Vec<String> {
         self.bench().columns.notes.clone()
@@ -86,41 +56,21 @@ impl<B: BuiltIn + Debug + Send> Diagnosable for B {
         self.bench().columns.of(name).map(<[f64]>::to_vec)
     }
 
-    fn next(
-        &self,
-        diagnosis: &Diagnosis,
-        evidence: &Evidence,
-    ) -> Result<Option<Proposal>, GapError> {
-        next_experiment(self, diagnosis, evidence)
+    fn in_words(&self, effect: usize) -> [&str; 2] {
+        let effect = self.bench().rows[effect];
+        [effect.words, effect.equation]
     }
 
-    /// Code for the effects that a diagnosis names, with the fitted numbers, in the re-tuned simulator.
-    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
-        let Bench { about, rows, .. } = self.bench();
-        let Ok(chosen) = Chosen::of(diagnosis, evidence) else { return Vec::new() };
-        // The sample time is valid, because a diagnosis ran with it.
-        let Ok(grid) = Grid::samples(about.dt_s) else { return Vec::new() };
-        let model = evidence.candidates.first().unwrap_or(&evidence.best);
-        let around = self.surroundings(model, &grid);
-        let one = |(index, values): (usize, &[f64])| {
-            let effect = rows[index];
-            Implementation {
-                name: effect.name.to_owned(),
-                words: effect.words.to_owned(),
-                stage: effect.stage.name().to_owned(),
-                formula: effect.equation.to_owned(),
-                numbers: chosen.numbers(effect.name),
-                sketch: effect.sketch(&complete(self, model, effect, values.to_vec()), &around),
-            }
-        };
-        chosen.named(&about.effects).into_iter().map(one).collect()
+    fn sketch(&self, effect: usize, values: &[f64], model: &Model) -> Option<Sketch> {
+        let grid = Grid::samples(self.bench().about.dt_s).ok()?;
+        self.bench().rows[effect].sketch(values, &self.surroundings(model, &grid))
     }
 
     /// A rig file with the findings of a diagnosis: see [`Fix`]. A diagnosis of the same recording with this file gives
     /// `no_gap`.
     ///
-    /// A diagnosis does not fit a hum's amplitude and phase, so the file has values that are estimated from the fit
-    /// trials, on the session's clock.
+    /// A diagnosis finds the phase of a hum in the recording, second by second, so the file has a phase that stands in
+    /// for it.
     fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let Bench { about, rows, effects, .. } = self.bench();
         let chosen = Chosen::of(diagnosis, evidence)?;
@@ -132,8 +82,8 @@ impl<B: BuiltIn + Debug + Send> Diagnosable for B {
         let mut effects = effects.clone();
         for (index, values) in chosen.effects(&about.effects) {
             let effect = rows[index];
-            let values = complete(self, chosen.model, effect, Self::within(effect, values));
-            chosen.describe(effect.into(), &mut remarks);
+            let values = Self::within(effect, &effect.with_stand_ins(values));
+            chosen.describe(effect.name, self.in_words(index), &mut remarks);
             effects.push(effect, &values)?;
         }
         let file = self.file(&chosen, effects, &mut remarks)?;

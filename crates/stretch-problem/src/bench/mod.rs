@@ -12,15 +12,12 @@ mod specs;
 
 use std::path::Path;
 
-use stretch_data::RigFile;
-use stretch_gap::{
-    Description, DescriptionSpec, Line, Model, ParameterSpec, RecordFacts, StageSpec,
-};
+use stretch_data::{Channel, RigFile, Trial};
+use stretch_gap::{Description, DescriptionSpec, Model, ParameterSpec, RecordFacts, StageSpec};
 use stretch_sim::{Effect, EffectSet, Measured, SimError};
 
 use crate::error::ProblemError;
 pub(crate) use acting::Acting;
-use acting::all;
 pub(crate) use built_in::BuiltIn;
 use columns::Columns;
 use specs::shown;
@@ -77,20 +74,6 @@ impl Bench {
         Measured { samples, noise: self.noise, unit: self.unit, dt_s: self.columns.dt_s }
     }
 
-    /// The effects of a model and of the simulator, divided by what becomes of them.
-    pub(crate) fn acting<'a>(&'a self, model: &'a Model) -> Result<Acting<'a>, SimError> {
-        Acting::of(all(&self.effects, &self.rows, model))
-    }
-
-    /// The spectral lines that the effects of the simulator and of a model add to the sensor's signal in the test
-    /// samples.
-    pub(crate) fn lines(&self, model: &Model) -> Vec<Line> {
-        all(&self.effects, &self.rows, model)
-            .filter_map(|(effect, values)| effect.line(values))
-            .map(|line| Line { hertz: line.hertz, amplitude: self.unit * line.amplitude })
-            .collect()
-    }
-
     /// The effects of a simulator and of a model without a recording: typical values replace those that would be
     /// estimated from a recording.
     pub(crate) fn unrecorded(&self, model: &Model) -> Result<EffectSet, SimError> {
@@ -118,6 +101,19 @@ pub(crate) fn straight_line<I: Iterator<Item = (f64, f64)>>(
     pairs: impl Fn() -> I,
     flat: f64,
 ) -> (f64, f64) {
+/// A trial of named columns with a value every `dt_s` seconds.
+pub(crate) fn even_trial(
+    name: &str,
+    dt_s: f64,
+    columns: impl IntoIterator<Item = (String, Vec<f64>)>,
+) -> Trial {
+    let columns = columns.into_iter().map(|(name, values)| Channel { name, values });
+    let channels: Vec<Channel> = columns.collect();
+    let (samples, rate_hz) = (channels.first().map_or(0, |c| c.values.len()), 1.0 / dt_s);
+    let time_s = (0..samples).map(|i| i as f64 / rate_hz).collect();
+    Trial { name: name.to_owned(), time_s, channels }
+}
+
     let (n, x, y) = pairs().fold((0.0_f64, 0.0, 0.0), |(n, a, b), (x, y)| (n + 1.0, a + x, b + y));
     let (mean_x, mean_y) = (x / n.max(1.0), y / n.max(1.0));
     let (xx, xy) = pairs().fold((0.0, 0.0), |(xx, xy), (x, y)| {

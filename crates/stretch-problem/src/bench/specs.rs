@@ -20,17 +20,15 @@ fn spec(effect: &Effect, place: Place) -> EffectSpec {
         let name = if unit == 1.0 { &p.unit } else { "1" };
         EffectParameter { min: range[0], max: range[1], ..p.times(unit, name) }
     };
+    let parameters = effect.fitted().zip(&search.ranges).map(parameter).collect();
+    let stage = (touches.first().copied().unwrap_or(0), effect.stage.name());
     EffectSpec {
-        name: effect.name.into(),
-        stage: effect.stage.name().into(),
         touches,
-        parameters: effect.fitted().zip(&search.ranges).map(parameter).collect(),
         starts: search.starts,
         is_found: effect.find().is_some(),
         drifts: effect.drifts(),
         twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
-        reads: None,
-        kind: None,
+        ..EffectSpec::new(effect.name, stage, parameters)
     }
 }
 

@@ -10,12 +10,15 @@ use std::{
     hash::{Hash, Hasher},
 };
 
-use stretch_data::{Channel, Trial, ends};
+use stretch_data::{Trial, ends};
 use stretch_effects::{Beside, Side};
 use stretch_gap::{GapError, Laboratory, Model, Plan, Run, Simulator};
 
 use super::{BlackBox, runs::Altered, source::SourceError};
-use crate::bench::courses::{course, moving, paced};
+use crate::bench::{
+    courses::{course, moving, paced},
+    even_trial,
+};
 
 /// Greatest number of inputs that candidates move.
 const MOVED: usize = 3;
@@ -76,11 +79,8 @@ impl BlackBox {
             let shares = course(&points, dt_s).chain(std::iter::repeat(last)).take(samples);
             shares.map(|x| low + span * x).collect()
         };
-        let values = all.iter().enumerate().map(one);
         let names = all.iter().map(|d| d.name.clone());
-        let channels = names.zip(values).map(|(name, values)| Channel { name, values }).collect();
-        let time_s = (0..samples).map(|i| i as f64 * dt_s).collect();
-        Trial { name: name.to_owned(), time_s, channels }
+        even_trial(name, dt_s, names.zip(all.iter().enumerate().map(one)))
     }
 
     /// The inputs of a stage in an experiment in which the stages before it gave `outputs`.
@@ -146,9 +146,7 @@ impl BlackBox {
 }
 
 impl Laboratory for BlackBox {
-    type Setting = Trial;
-
-    fn experiments(&self) -> Vec<(Plan, Trial)> {
+    fn experiments(&self) -> Vec<Plan> {
         let all = self.driven();
         let dt_s = self.description().dt_s;
         let lasts_s = self.problem.session().samples(1) as f64 * dt_s;
@@ -165,16 +163,14 @@ impl Laboratory for BlackBox {
                     1 => (name.to_owned(), how.to_owned()),
                     _ => (format!("{name} of {}", d.name), format!("{how} By {}.", d.name)),
                 };
-                candidates.push((how, self.moved(&name, &all, Some((at, &scaled)))));
+                let trial = self.moved(&name, &all, Some((at, &scaled)));
+                candidates.push(Plan { how, prepare_min: PREPARE_MIN, trial });
             }
         }
         let how = "Leave all inputs at their median: what changes does not come from motion.";
-        candidates.push((how.to_owned(), self.moved("rest", &all, None)));
-        let plan = |(how, trial): (String, Trial)| {
-            let (name, prepare_min) = (trial.name.clone(), PREPARE_MIN);
-            (Plan { name, how, prepare_min, trial: trial.clone() }, trial)
-        };
-        candidates.into_iter().map(plan).collect()
+        let trial = self.moved("rest", &all, None);
+        candidates.push(Plan { how: how.to_owned(), prepare_min: PREPARE_MIN, trial });
+        candidates
     }
 
     /// Returns the measured inputs of the first trial.
@@ -182,10 +178,9 @@ impl Laboratory for BlackBox {
         let samples = self.problem.session().samples(1);
         let measured = |d: Driven| {
             let values = self.problem.columns.all(&d.name)[..samples].to_vec();
-            Channel { name: d.name, values }
+            (d.name, values)
         };
-        let channels = self.driven().into_iter().map(measured).collect();
-        Trial { channels, ..Trial::default() }
+        even_trial("done", self.description().dt_s, self.driven().into_iter().map(measured))
     }
 
     fn predict(&self, model: &Model, course: &Trial) -> Result<Vec<Vec<f64>>, GapError> {

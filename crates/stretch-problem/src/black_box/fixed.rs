@@ -4,28 +4,19 @@
 use std::num::NonZeroUsize;
 
 use stretch_data::{EffectEntry, Remarks, significant};
-use stretch_gap::{Diagnosis, Evidence, GapError, Proposal, Simulator, next_experiment};
+use stretch_effects::Sketch;
+use stretch_gap::{Diagnosis, Evidence, Model, Simulator};
 
 use super::{BlackBox, catalogue::Acting, spec::ProblemSpec};
 use crate::{
-    fix::{Chosen, Fix, Fixed, Meaning, NoFix},
-    implement::Implementation,
+    fix::{Chosen, Fix, Fixed, NoFix},
     problem::Diagnosable,
 };
 
 /// Words and equation of an effect that the simulator has itself.
-const OWN: (&str, &str) = ("an effect that the simulator has itself", "arguments of the simulator");
+const OWN: [&str; 2] = ["an effect that the simulator has itself", "arguments of the simulator"];
 
 impl BlackBox {
-    /// An effect of the catalogue in words.
-    fn meaning(&self, effect: usize) -> Meaning<'_> {
-        let name = self.description().effects[effect].name.as_str();
-        match self.problem.wrapper(effect) {
-            Some(kind) => Meaning { name, words: kind.words, equation: kind.equation },
-            None => Meaning { name, words: OWN.0, equation: OWN.1 },
-        }
-    }
-
     /// Writes the values of an effect that was found into the file, so that the effect acts in every run.
     fn add(&self, file: &mut ProblemSpec, effect: usize, values: &[f64]) {
         let spec = &self.description().effects[effect];
@@ -64,33 +55,12 @@ impl Diagnosable for BlackBox {
         notes
     }
 
-    fn next(
-        &self,
-        diagnosis: &Diagnosis,
-        evidence: &Evidence,
-    ) -> Result<Option<Proposal>, GapError> {
-        match next_experiment(self, diagnosis, evidence) {
-            // There is no prediction if the run budget is spent or a model cannot be run on other
-            // inputs.
-            Err(GapError::Simulator(_) | GapError::Spent { .. }) => Ok(None),
-            proposal => proposal,
-        }
+    fn in_words(&self, effect: usize) -> [&str; 2] {
+        self.problem.wrapper(effect).map_or(OWN, |kind| [kind.words, kind.equation])
     }
 
-    fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
-        let Ok(chosen) = Chosen::of(diagnosis, evidence) else { return Vec::new() };
-        let one = |(effect, values): (usize, &[f64])| {
-            let Meaning { name, words, equation } = self.meaning(effect);
-            Implementation {
-                name: name.to_owned(),
-                words: words.to_owned(),
-                stage: self.description().effects[effect].stage.clone(),
-                formula: equation.to_owned(),
-                numbers: chosen.numbers(name),
-                sketch: self.problem.sketch(effect, values),
-            }
-        };
-        chosen.named(&self.description().effects).into_iter().map(one).collect()
+    fn sketch(&self, effect: usize, values: &[f64], _: &Model) -> Option<Sketch> {
+        self.problem.sketch(effect, values)
     }
 
     fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
@@ -119,10 +89,10 @@ impl Diagnosable for BlackBox {
         }
         let mut effects = Vec::new();
         for (effect, values) in chosen.effects(&self.description().effects) {
-            let meaning = self.meaning(effect);
-            chosen.describe(meaning, &mut remarks);
+            let name = &self.description().effects[effect].name;
+            chosen.describe(name, self.in_words(effect), &mut remarks);
             self.add(&mut file, effect, values);
-            effects.push(meaning.name.to_owned());
+            effects.push(name.clone());
         }
         Ok(Fix { file: Fixed::Problem(Box::new(file)), effects, remarks })
     }

@@ -22,10 +22,6 @@ impl BuiltIn for GaugeSimulator {
         Gauge::surroundings(&self.spec, grid)
     }
 
-    fn line_unit(&self, model: &Model) -> f64 {
-        model.parameters[GAIN]
-    }
-
     fn file(
         &self,
         chosen: &Chosen<'_>,

@@ -145,7 +145,7 @@ fn records_that_cannot_be_used_are_refused_by_name() {
     let all: Vec<Option<f64>> = (0..6001).map(value).collect();
     let clipped = spoiled(2, &|i| Some(format!("{:.5}", all[i]?.min(1.5))));
     let text = runs(&mut run(&clipped, "angle_deg", "s2"));
-    assert!(text.contains("s2 is at its greatest value, 1.5"), "{text}");
+    assert!(text.contains("s2 is at 1.5, its greatest value"), "{text}");
     // Exchanged reference and signal are reported, and no effect is named with certainty.
     let text = runs(&mut run(&good, "s2", "angle_deg"));
     assert!(text.contains("swapped?"), "{text}");

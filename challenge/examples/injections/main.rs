@@ -14,7 +14,7 @@ use inject::{ALL, Injection};
 use stretch_challenge::shared_out;
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::{Options, diagnose};
-use stretch_problem::{GaugeSetup, GaugeSimulator};
+use stretch_problem::{Diagnosable, GaugeSetup, GaugeSimulator};
 use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::Catalogue;
 use tables::{Said, tables};

@@ -28,16 +28,6 @@ pub enum ProblemError {
     Refused(String),
 }
 
-/// Refuses a sample rate outside 1e-3 .. 1e7 Hz, because such time stamps are in another unit. The
-/// check comes before any time is converted to samples.
-pub(crate) fn check_rate(dt_s: f64) -> Result<(), ProblemError> {
-    if (1e-7..=1e3).contains(&dt_s) {
-        return Ok(());
-    }
-    let hint = "rates from 0.001 to 10 000 000 Hz are understood; is the time in seconds?";
-    Err(ProblemError::value("time_s", format!("a sample every {dt_s} s"), hint))
-}
-
 impl From<GridError> for ProblemError {
     fn from(error: GridError) -> Self {
         Self::Sim(error.into())
@@ -80,12 +70,6 @@ impl ProblemError {
     /// Returns the error for a column that stays constant.
     pub(crate) fn dead(column: impl fmt::Display, found: String) -> Self {
         Self::value(column, found, "the channel is dead: check the sensor and its cable")
-    }
-
-    /// Returns the error for too few samples to fit.
-    pub(crate) fn few_samples(samples: usize, least: usize) -> Self {
-        let what = format!("the trials to fit have {samples} samples");
-        Self::too_little(what, format!("at least {least} are needed for a diagnosis"))
     }
 
     /// Returns the error for data that do not suffice.

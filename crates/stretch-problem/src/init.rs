@@ -1,15 +1,12 @@
 //! Writes a first problem file for a folder of recordings. Comments in the file say which entries are guessed.
 
-use std::{
-    ops::Range,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
-use stretch_data::{Quantity, Trial, ends, significant, toml_comment, unit};
+use stretch_data::{Quantity, SessionTrial, Trial, ends, significant, toml_comment, unit};
 use stretch_gap::Noise;
 use stretch_recording::{ReadOptions, Recording};
 
-use crate::error::ProblemError;
+use crate::{bench::columns::Columns, error::ProblemError};
 
 /// Usual names of the column of time.
 const TIMES: [&str; 10] =
@@ -271,20 +268,11 @@ fn rubbing<'a>(
 /// recordings.
 fn noise(output: &str, commands: &[&str], trials: &[(String, Trial)]) -> Option<Noise> {
     let fitted = trials.iter().zip(is_tested(trials)).filter(|(_, is_tested)| !is_tested);
-    let fitted: Vec<&(String, Trial)> = fitted.map(|(trial, _)| trial).collect();
-    let dt_s = 1.0 / fitted.first()?.1.rate_hz()?;
-    let of = |name: &str| -> Vec<f64> {
-        fitted.iter().flat_map(|(_, t)| t.channel(name).unwrap_or(&[])).copied().collect()
-    };
-    let mut end = 0;
-    let ranges = fitted.iter().map(|(_, t)| {
-        end += t.time_s.len();
-        end - t.time_s.len()..end
-    });
-    let ranges: Vec<Range<usize>> = ranges.collect();
-    let (output, commands) = (of(output), commands.iter().map(|c| of(c)).collect::<Vec<_>>());
-    let commands: Vec<&[f64]> = commands.iter().map(Vec::as_slice).collect();
-    Noise::of_rests(&output, &commands, &ranges, dt_s)
+    let fitted: Vec<_> = fitted.map(|((_, t), _)| SessionTrial::new(t.clone())).collect();
+    let names = [output].iter().chain(commands).map(|name| (*name).to_owned()).collect();
+    let columns = Columns::even(&fitted, names, 1).ok()?;
+    let commands: Vec<&[f64]> = commands.iter().map(|c| columns.all(c)).collect();
+    Noise::of_rests(columns.all(output), &commands, &columns.ranges, columns.dt_s)
 }
 
 /// Whether each recording is kept for testing: the last quarter, the shorter of two, none of one.

@@ -7,7 +7,7 @@ use stretch_data::{Channel, RigFile, SessionTrial, Split, Trial};
 use stretch_gap::{
     Diagnosis, Laboratory, Options, Plan, Simulator, VerdictKind, diagnose, next_experiment,
 };
-use stretch_problem::{GaugeSetup, GaugeSimulator, ProblemError, in_words};
+use stretch_problem::{Diagnosable, GaugeSetup, GaugeSimulator, ProblemError, in_words};
 use stretch_sim::{Catalogue, GaugeRig};
 use testkit::tolerance::{FIT_WELL, GAIN_FOUND, RESUMED_S, SKEW_FOUND_S};
 
@@ -457,7 +457,7 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
     let metres = |t: &mut Trial| values(t, 0, &|_, x| 1e-3 * x);
     noted(gauge(&metres, "rod_mm", "s1"), &["rod_mm", "metres"]);
     let clipped = |t: &mut Trial| values(t, 1, &|_, y| y.max(-0.2));
-    noted(gauge(&clipped, "rod_mm", "s1"), &["s1", "least value, -0.2", "lost"]);
+    noted(gauge(&clipped, "rod_mm", "s1"), &["s1 is at -0.2, its least value", "lost"]);
     assert!(gauge(&|_| (), "rod_mm", "s1").expect("a gauge").notes().is_empty());
 }
 

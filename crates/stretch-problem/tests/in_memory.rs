@@ -7,8 +7,8 @@ use stretch_calibrate::{Options, apply, calibrate, evaluate, without_gross_error
 use stretch_data::{Channel, EvenSession, SessionTrial, Split, Trial};
 use stretch_gap::{Description, DescriptionSpec, Simulator};
 use stretch_problem::{
-    Checked, GaugeSetup, GaugeSimulator, ProblemError, ProblemSpec, RigSession, RigSetup,
-    RigSimulator, StageEntry,
+    Checked, Diagnosable, GaugeSetup, GaugeSimulator, ProblemError, ProblemSpec, RigSession,
+    RigSetup, RigSimulator, StageEntry,
 };
 use stretch_sim::{Catalogue, Rig, RigParams, RunSettings, TrialPlan};
 

@@ -8,7 +8,9 @@ use crate::support::rigs::own_rig;
 use crate::support::session::{DT_S, session};
 use stretch_data::{Channel, SessionTrial, Split};
 use stretch_gap::{Diagnosis, Model, Options, Run, Simulator, VerdictKind, diagnose};
-use stretch_problem::{GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator};
+use stretch_problem::{
+    Diagnosable, GaugeSetup, GaugeSimulator, RigSession, RigSetup, RigSimulator,
+};
 use stretch_sim::{Catalogue, EffectSet, Key, Rig, RigParams};
 
 /// A case: effects that the real rig has in addition to its file.

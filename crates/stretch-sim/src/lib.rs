@@ -16,7 +16,7 @@ pub use effects::{ActiveEffect, CATALOGUE, Catalogue, EffectSet, effect_named};
 pub use error::SimError;
 pub use gauge::{Gauge, GaugeRig, GaugeSpec};
 pub use params::{Key, PARAMETERS, ParameterInfo, RigParams, Tolerance};
-pub use protocol::{OPENINGS, PAUSE_S, RATE_HZ, TrialPlan};
+pub use protocol::{OPENINGS, PAUSE_S, RATE_HZ, TrialPlan, excitation_share};
 pub use rig::{LEAST_STRAIN, Rig, RunSettings, default_rig_text, demo_preset, paper_preset};
 pub use session::Session;
 pub use stages::{

@@ -234,7 +234,7 @@ impl TrialPlan {
             rate_hz,
             inlet,
             outlet,
-            excitation: excitation(trial)?,
+            excitation: excitation_share(trial)?,
             set_length_mm: trial.channel(SET_LENGTH).map(<[f64]>::to_vec),
             shunt: shunt(trial)?,
             ..Self::new(file, TrialKind::Other, 0.0)
@@ -288,8 +288,11 @@ fn check_columns(trial: &Trial) -> Result<(), SimError> {
     }
 }
 
-/// Share of the rig's excitation, the same in every row.
-fn excitation(trial: &Trial) -> Result<f64, SimError> {
+/// Returns the excitation of the bridge as a share of the rig's: the column `excitation_share` of a trial, or 1.
+///
+/// # Errors
+/// Values that differ from row to row, or are outside 0 .. 2.
+pub fn excitation_share(trial: &Trial) -> Result<f64, SimError> {
     let Some(shares) = trial.channel(EXCITATION) else { return Ok(1.0) };
     let share = shares.first().copied().unwrap_or(1.0);
     match shares.iter().find(|s| **s != share || !(**s > 0.0 && **s <= 2.0)) {

@@ -36,20 +36,11 @@ pub(crate) trait BuiltIn: Laboratory {
         effects: EffectSet,
         remarks: &mut Remarks,
     ) -> Result<RigFile, NoFix>;
-
-    /// Notes that are known only after the diagnosis, in sentences.
-    fn afterwards(&self) -> Vec<String> {
-        Vec::new()
-    }
 }
 
 impl<B: BuiltIn + Debug + Send> Diagnosable for B {
     fn notes(&self) -> Vec<String> {
         self.bench().columns.notes.clone()
-    }
-
-    fn afterwards(&self) -> Vec<String> {
-        BuiltIn::afterwards(self)
     }
 
     fn column(&self, name: &str) -> Option<Vec<f64>> {

@@ -6,6 +6,7 @@ use stretch_data::{EvenSession, EvenTrial, Rows, SessionTrial, Split, ends};
 use stretch_gap::{RowsUsed, SampleRoles, TrialSpec};
 
 use crate::{
+    bench::{isolated_outliers::replace_isolated_outliers, shortened::shortened},
     black_box::{StageEntry, velocity::of_position},
     error::ProblemError,
 };
@@ -15,8 +16,13 @@ use crate::{
 const SHORTEST: [usize; 2] = [20, 50];
 const SHORTEST_S: f64 = 5.0;
 
+/// Parts with fewer samples are left out if the simulator is built in.
+const SHORTEST_BUILT_IN: usize = 100;
+/// Smallest number of samples to fit if the simulator is built in.
+const LEAST: usize = 300;
+
 /// Returns the least number of samples of a part, from the sample rate of the trials.
-fn shortest(trials: &[SessionTrial]) -> usize {
+pub(crate) fn shortest(trials: &[SessionTrial]) -> usize {
     let rate_hz = trials.iter().find_map(|t| t.trial.rate_hz()).unwrap_or(f64::INFINITY);
     ((SHORTEST_S * rate_hz) as usize).clamp(SHORTEST[0], SHORTEST[1])
 }
@@ -69,10 +75,25 @@ impl Columns {
         })
     }
 
-    /// Columns of a user's own simulator: as [`Columns::even`], with parts of five seconds or more, and at least one
-    /// trial that may be fitted.
-    pub(crate) fn read(trials: &[SessionTrial], names: Vec<String>) -> Result<Self, ProblemError> {
-        let columns = Self::even(trials, names, shortest(trials))?;
+    /// Columns of a simulator with so many `outputs`. The trials are brought onto one even grid, without parts of fewer
+    /// than `shortest` samples. Recordings that are too long are cut, and isolated outliers of the columns of `sensors` are
+    /// replaced before, because the grid would spread an outlier over its neighbours.
+    ///
+    /// # Errors
+    /// Columns that are missing, trials of different rates or of no plausible rate, and no trial that may be fitted.
+    pub(crate) fn read(
+        trials: &[SessionTrial],
+        names: Vec<String>,
+        sensors: &[&str],
+        outputs: usize,
+        shortest: usize,
+    ) -> Result<Self, ProblemError> {
+        let (mut trials, cut) = shortened(trials, outputs)?;
+        let outliers = match sensors {
+            [] => Vec::new(),
+            _ => replace_isolated_outliers(trials.to_mut(), sensors),
+        };
+        let mut columns = Self::even(&trials, names, shortest)?;
         if !trials.is_empty() && trials.iter().all(|t| t.split == Split::Test) {
             let hint = "give at least one trial that is not a test trial";
             return Err(ProblemError::too_little("there is no trial to fit", hint));
@@ -80,24 +101,50 @@ impl Columns {
         if columns.trials.is_empty() {
             return Err(ProblemError::value(
                 "recordings",
-                format!("no trial has {} samples in a row", shortest(trials)),
+                format!("no trial has {shortest} samples in a row"),
                 "record at least 10 s to fit and 5 s to test on, without gaps",
             ));
         }
+        // Time stamps outside of these limits are in another unit.
+        if !(1e-7..=1e3).contains(&columns.dt_s) {
+            let hint = "rates from 0.001 to 10 000 000 Hz are understood; is the time in seconds?";
+            let found = format!("a sample every {} s", columns.dt_s);
+            return Err(ProblemError::value("time_s", found, hint));
+        }
+        columns.notes.splice(0..0, cut);
+        columns.notes.extend(outliers);
         Ok(columns)
     }
 
-    /// Marks the samples that gaps leave [`undetermined`] as lost, too. `by_motion` states whether a part behind a gap
-    /// depends on the motion before it.
-    pub(crate) fn mark_undetermined(&mut self, by_motion: bool) {
-        for (trial, range) in self.ranges.iter().enumerate() {
-            let is_lost = &self.is_lost[range.clone()];
-            let marked = match by_motion && self.goes_on(trial) {
-                true => undetermined_behind_gap(is_lost, self.dt_s),
+    /// Columns of a simulator that is built in. Samples that gaps leave [`undetermined`] are marked as lost, too.
+    /// `by_motion` states whether a part behind a gap depends on the motion before it.
+    ///
+    /// # Errors
+    /// As [`Columns::read`], and too few samples to fit.
+    pub(crate) fn built_in(
+        trials: &[SessionTrial],
+        names: Vec<String>,
+        sensors: &[&str],
+        outputs: usize,
+        by_motion: bool,
+    ) -> Result<Self, ProblemError> {
+        let mut columns = Self::read(trials, names, sensors, outputs, SHORTEST_BUILT_IN)?;
+        for (trial, range) in columns.ranges.iter().enumerate() {
+            let is_lost = &columns.is_lost[range.clone()];
+            let marked = match by_motion && columns.goes_on(trial) {
+                true => undetermined_behind_gap(is_lost, columns.dt_s),
                 false => undetermined(is_lost),
             };
-            self.is_lost[range.clone()].copy_from_slice(&marked);
+            columns.is_lost[range.clone()].copy_from_slice(&marked);
         }
+        let samples: usize = columns.fitted().map(|r| r.len()).sum();
+        if samples < LEAST {
+            return Err(ProblemError::too_little(
+                format!("the trials to fit have {samples} samples"),
+                format!("at least {LEAST} are needed for a diagnosis"),
+            ));
+        }
+        Ok(columns)
     }
 
     /// Whether a trial continues the trial before it after a gap.

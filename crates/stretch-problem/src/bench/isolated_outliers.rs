@@ -22,17 +22,15 @@ const KINK: f64 = 0.5;
 /// single outlier a ratio of 3/2.
 const STEP: f64 = 1.25;
 
-/// Measured columns of a rig.
-const MEASURED: [&str; 3] = ["pressure_kpa", "length_mm", "bridge_v"];
-
-/// Trials with the isolated outliers of their measured columns replaced, and a sentence for each column that had some.
-pub(crate) fn without_isolated_outliers(
-    mut trials: Vec<SessionTrial>,
-) -> (Vec<SessionTrial>, Vec<String>) {
+/// Replaces the isolated outliers of some columns, and gives a sentence for each column that had some.
+pub(crate) fn replace_isolated_outliers(
+    trials: &mut [SessionTrial],
+    columns: &[&str],
+) -> Vec<String> {
     let mut notes = Vec::new();
-    for name in MEASURED {
+    for name in columns {
         let channels = trials.iter_mut().flat_map(|t| &mut t.trial.channels);
-        let own = channels.filter(|channel| channel.name == name);
+        let own = channels.filter(|channel| channel.name == *name);
         let count: usize = own.map(|channel| replace_outliers(&mut channel.values)).sum();
         if count > 0 {
             notes.push(format!(
@@ -40,7 +38,7 @@ pub(crate) fn without_isolated_outliers(
             ));
         }
     }
-    (trials, notes)
+    notes
 }
 
 /// Replaces the isolated outliers of a channel and gives their number.

@@ -5,8 +5,9 @@ mod acting;
 mod built_in;
 pub(crate) mod columns;
 pub(crate) mod courses;
-pub(crate) mod isolated_outliers;
-pub(crate) mod shortened;
+mod isolated_outliers;
+pub(crate) mod rails;
+mod shortened;
 pub(crate) mod smooth;
 mod specs;
 
@@ -91,6 +92,15 @@ pub(crate) fn finite(stage: &str, samples: &[f64]) -> Result<(), ProblemError> {
         true => Ok(()),
         false => Err(ProblemError::Refused(format!(
             "{stage}: the simulation gave a number that is not finite; a parameter of the rig is too large or too small"
+    let (n, x, y) = pairs().fold((0.0_f64, 0.0, 0.0), |(n, a, b), (x, y)| (n + 1.0, a + x, b + y));
+    let (mean_x, mean_y) = (x / n.max(1.0), y / n.max(1.0));
+    let (xx, xy) = pairs().fold((0.0, 0.0), |(xx, xy), (x, y)| {
+        (xx + (x - mean_x) * (x - mean_x), xy + (x - mean_x) * (y - mean_y))
+    });
+    let slope = if xx > 0.0 && xy != 0.0 { xy / xx } else { flat };
+    (mean_y - slope * mean_x, slope)
+}
+
         ))),
     }
 }
@@ -112,15 +122,6 @@ pub(crate) fn even_trial(
     let (samples, rate_hz) = (channels.first().map_or(0, |c| c.values.len()), 1.0 / dt_s);
     let time_s = (0..samples).map(|i| i as f64 / rate_hz).collect();
     Trial { name: name.to_owned(), time_s, channels }
-}
-
-    let (n, x, y) = pairs().fold((0.0_f64, 0.0, 0.0), |(n, a, b), (x, y)| (n + 1.0, a + x, b + y));
-    let (mean_x, mean_y) = (x / n.max(1.0), y / n.max(1.0));
-    let (xx, xy) = pairs().fold((0.0, 0.0), |(xx, xy), (x, y)| {
-        (xx + (x - mean_x) * (x - mean_x), xy + (x - mean_x) * (y - mean_y))
-    });
-    let slope = if xx > 0.0 && xy != 0.0 { xy / xx } else { flat };
-    (mean_y - slope * mean_x, slope)
 }
 
 /// Reads a rig file as one kind of rig; an error names the file.

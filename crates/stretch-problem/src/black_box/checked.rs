@@ -17,7 +17,7 @@ use super::{
     velocity::{integral_of, of_position},
 };
 use crate::{
-    bench::{columns::Columns, shortened::shortened},
+    bench::columns::{Columns, shortest},
     error::ProblemError,
     wrap::{Among, Placed, Site},
 };
@@ -56,17 +56,17 @@ impl Checked {
         let ProblemSpec { inputs, parameters, effects, .. } = &spec;
         let stages = &spec.stages.iter().map(|s| rubbing(s, &spec)).collect::<Vec<_>>();
         check_known(stages, parameters, effects)?;
-        let (trials, cut) = shortened(&trials, stages.len())?;
         let names = used(stages, &spec);
         let apart = spec.by.clone().filter(|by| !names.contains(by));
-        let mut columns = Columns::read(&trials, names.into_iter().chain(apart.clone()).collect())?;
+        let names = names.into_iter().chain(apart.clone()).collect();
+        let mut columns = Columns::read(&trials, names, &[], stages.len(), shortest(&trials))?;
         columns.choose_turns(stages);
         // the column that distinguishes runs was read last
         let by = apart.and_then(|_| columns.names.pop().zip(columns.values.pop()));
         check_stated(stages, inputs, &columns)?;
         let sensor = spec.reference.as_ref().zip(spec.signal.as_ref());
         let sensor = sensor.map(|sensor| sensor_of(sensor, stages)).transpose()?;
-        let mut notes: Vec<String> = cut.into_iter().chain(columns.notes.iter().cloned()).collect();
+        let mut notes = columns.notes.clone();
         let grid = Grid::samples(columns.dt_s).map_err(|e| {
             ProblemError::value("recordings", e.to_string(), "check their time columns")
         })?;

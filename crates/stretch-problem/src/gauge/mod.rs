@@ -137,11 +137,6 @@ impl GaugeSimulator {
         Ok(Self { bench, spec, tolerances: [offset, gain], input })
     }
 
-    /// Notes from reading the recordings, in sentences.
-    pub fn notes(&self) -> &[String] {
-        &self.bench.columns.notes
-    }
-
     /// The gauge with the offset and the gain of a model.
     fn tuned(&self, model: &Model) -> GaugeSpec {
         let [offset, gain] = [OFFSET, GAIN].map(|index| model.parameters[index]);

@@ -5,8 +5,8 @@ use stretch_data::{SessionTrial, unit};
 use stretch_gap::Noise;
 
 use crate::{
-    bench::{columns::Columns, shortened::shortened},
-    error::{ProblemError, check_rate},
+    bench::{columns::Columns, rails::rails},
+    error::ProblemError,
 };
 
 /// Index of the reference among the columns.
@@ -15,11 +15,6 @@ pub(super) const REFERENCE: usize = 0;
 pub(super) const SIGNAL: usize = 1;
 /// Index of the pressure, which is a column if every trial has one.
 const PRESSED: usize = 2;
-
-/// Smallest number of samples to fit.
-const LEAST: usize = 300;
-/// Parts of a trial with fewer samples are left out.
-const SHORTEST: usize = 100;
 
 /// Reads two columns of some trials, and the pressure if every trial has one.
 ///
@@ -31,15 +26,11 @@ pub(super) fn read(
     reference: &str,
     signal: &str,
 ) -> Result<Columns, ProblemError> {
-    let (trials, cut) = shortened(trials, 1)?;
     let mut names = vec![reference.to_owned(), signal.to_owned()];
     if trials.iter().all(|t| t.trial.channel(PRESSURE).is_some()) {
         names.push(PRESSURE.to_owned());
     }
-    let mut columns = Columns::even(&trials, names, SHORTEST)?;
-    check_rate(columns.dt_s)?;
-    columns.notes.splice(0..0, cut);
-    columns.mark_undetermined(false);
+    let mut columns = Columns::built_in(trials, names, &[reference, signal], 1, false)?;
     let notes = checked(&columns)?;
     columns.notes.extend(notes);
     Ok(columns)
@@ -59,23 +50,21 @@ pub(super) fn noise(columns: &Columns, values: &[f64]) -> Noise {
 fn checked(columns: &Columns) -> Result<Vec<String>, ProblemError> {
     let both = || columns.names.iter().zip(&columns.values).take(PRESSED);
     let (reference, signal) = (&columns.names[REFERENCE], &columns.names[SIGNAL]);
-    let samples: usize = columns.fitted().map(|r| r.len()).sum();
-    if samples < LEAST {
-        return Err(ProblemError::few_samples(samples, LEAST));
-    }
     if reference == "bridge_v" || signal == "length_mm" {
         let column = format!("--reference {reference}, --signal {signal}");
         let hint =
             "exchange them: the reference is the length, the signal is the output of the gauge";
         return Err(ProblemError::value(column, "the two look swapped", hint));
     }
-    let mut shares = Vec::new();
+    let (mut shares, mut clipped) = (Vec::new(), Vec::new());
     for (name, values) in both() {
         let (low, high) = columns.range(values);
         if high <= low {
             return Err(ProblemError::dead(name.as_str(), format!("{low} in every sample")));
         }
-        shares.push(noise(columns, values).sd() / (high - low));
+        let sd = noise(columns, values).sd();
+        shares.push(sd / (high - low));
+        clipped.extend(rails(columns, name, sd));
     }
     let mut notes = Vec::new();
     if shares[0] > 3.0 * shares[1] {
@@ -90,27 +79,7 @@ fn checked(columns: &Columns) -> Result<Vec<String>, ProblemError> {
                 "{name} goes from {low} to {high}: this looks like metres; the verdict does not depend on it"
             ));
         }
-        for (end, which) in [(low, "least"), (high, "greatest")] {
-            let share = standing(columns, values, end);
-            if share > 0.01 {
-                notes.push(format!(
-                    "{name} is at its {which} value, {end}, in {:.1} % of the samples: if this is a limit of its converter, all \
-                     values beyond it are lost",
-                    100.0 * share
-                ));
-            }
-        }
     }
+    notes.extend(clipped);
     Ok(notes)
-}
-
-/// Share of the samples that have the value `end`, in sequences of at least five such samples.
-fn standing(columns: &Columns, values: &[f64], end: f64) -> f64 {
-    let (mut count, mut all) = (0, 0);
-    for range in columns.fitted() {
-        all += range.len();
-        let rows = values[range].chunk_by(|a, b| (*a == end) == (*b == end));
-        count += rows.filter(|r| r[0] == end && r.len() >= 5).map(<[f64]>::len).sum::<usize>();
-    }
-    count as f64 / all.max(1) as f64
 }

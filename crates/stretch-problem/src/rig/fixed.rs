@@ -7,7 +7,6 @@ use stretch_sim::{Effect, EffectParameter, EffectSet, Grid, Rig, Surroundings};
 use super::{
     RigSimulator,
     nominal::{TunedParameter, TunedRig},
-    rails::rails,
 };
 use crate::{
     bench::{Bench, BuiltIn},
@@ -49,9 +48,5 @@ impl BuiltIn for RigSimulator {
         // A file that could not be read again is refused here.
         Rig::from_file(&file)?;
         Ok(file)
-    }
-
-    fn afterwards(&self) -> Vec<String> {
-        rails(&self.base, &self.bench.columns)
     }
 }

@@ -8,7 +8,6 @@ mod facts;
 mod fixed;
 mod noises;
 mod nominal;
-mod rails;
 mod run;
 mod session;
 mod stand_ins;
@@ -16,6 +15,7 @@ mod timing;
 
 use std::path::Path;
 
+use stretch_calibrate::PRESSURE;
 use stretch_data::DataSet;
 use stretch_gap::{Description, Distortion, GapError, Line, Model, Run, Simulator};
 use stretch_recording::ReadOptions;
@@ -29,10 +29,10 @@ use facts::facts;
 use noises::Noises;
 use nominal::{TunedParameter, parameters, stages};
 pub use session::RigSession;
-use session::{Inputs, VOLTAGE};
+use session::{Inputs, LENGTH, VOLTAGE};
 
 use crate::{
-    bench::{Bench, Place, columns::Columns, read_rig, smooth::MeasuredInput},
+    bench::{Bench, Place, columns::Columns, rails::rails, read_rig, smooth::MeasuredInput},
     error::ProblemError,
 };
 
@@ -90,8 +90,17 @@ impl RigSimulator {
     /// # Errors
     /// A rig with a value outside of its limits.
     pub fn new(setup: RigSetup<'_>) -> Result<Self, ProblemError> {
-        let RigSetup { session: RigSession { columns, excitation }, rig, catalogue } = setup;
+        let RigSetup { session: RigSession { mut columns, excitation }, rig, catalogue } = setup;
         rig.check()?;
+        let noise = |key: Key| rig.params[key];
+        let recorders = [
+            (VOLTAGE, noise(Key::SigmaV)),
+            (LENGTH, noise(Key::SigmaL)),
+            (PRESSURE, 1e-3 * noise(Key::SigmaP)),
+        ];
+        let saturated = recorders.into_iter().flat_map(|(name, sd)| rails(&columns, name, sd));
+        let saturated: Vec<String> = saturated.collect();
+        columns.notes.extend(saturated);
         let noises = Noises::of(&rig.params, &columns);
         let inputs = Inputs::of(&columns, &noises, None, 1e-3 * rig.params[Key::PS]);
         let stage_kinds = match inputs.pressure {
@@ -121,11 +130,6 @@ impl RigSimulator {
             tuned,
             found: RigCache::new(cache::MOST),
         })
-    }
-
-    /// Notes on the session, and on effects that it cannot show, in sentences for a report.
-    pub fn notes(&self) -> &[String] {
-        &self.bench.columns.notes
     }
 
     /// Nominal parameters as shipped.

@@ -3,9 +3,10 @@
 use std::{ops::Range, path::Path};
 
 use stretch_calibrate::PRESSURE;
-use stretch_data::{DataSet, SessionTrial, Split, ends};
+use stretch_data::{DataSet, SessionTrial, ends};
 use stretch_gap::{Noise, TrialSpec, copied, noise_variance};
 use stretch_recording::{ReadOptions, Recording};
+use stretch_sim::excitation_share;
 
 use super::{
     directions::{self, Motion},
@@ -15,12 +16,10 @@ use super::{
 use crate::{
     bench::{
         columns::Columns,
-        isolated_outliers::without_isolated_outliers,
-        shortened::shortened,
         smooth::{MeasuredInput, Smoothed, schedule},
         straight_line,
     },
-    error::{ProblemError, check_rate},
+    error::ProblemError,
 };
 
 /// Columns of the valves' openings, of the length and of the bridge voltage.
@@ -29,22 +28,15 @@ pub(super) const LENGTH: &str = "length_mm";
 pub(super) const VOLTAGE: &str = "bridge_v";
 /// Columns that a rig needs; the pressure is optional.
 const NEEDED: [&str; 4] = [VALVES[0], VALVES[1], LENGTH, VOLTAGE];
-/// Simulated outputs: pressure, length and voltage.
-const OUTPUTS: usize = 3;
-/// Column of the bridge's excitation, a share of the nominal one, the same throughout a trial; 1 if
-/// it is missing.
-const EXCITATION: &str = "excitation_share";
-/// Parts of a trial with fewer samples are left out.
-const SHORTEST: usize = 100;
+/// Columns of sensors, each of which is a simulated output.
+const MEASURED: [&str; 3] = [PRESSURE, LENGTH, VOLTAGE];
 /// Range that noise alone hardly ever reaches, standard deviations.
 const NOISE_SPAN: f64 = 15.0;
-/// Smallest number of samples to fit.
-const LEAST: usize = 300;
 
 /// A measured session of the rig, with notes on the reading: at least one trial, and at least one that may be fitted.
 #[derive(Debug, Clone)]
 pub struct RigSession {
-    pub(super) columns: Columns,
+    pub(crate) columns: Columns,
     /// By trial, the excitation of the bridge as a share of the nominal one.
     pub(super) excitation: Vec<f64>,
 }
@@ -62,39 +54,33 @@ impl RigSession {
     /// Binds trials with the columns `inlet`, `outlet` (0..1), `length_mm`, `bridge_v` and, if it
     /// was recorded, `pressure_kpa`. The trials are brought onto one even grid ([`EvenSession`](stretch_data::EvenSession)):
     /// lost samples are bridged, a long gap in time splits a trial into two, and the notes name
-    /// both. Without a test trial nothing is held back here: the diagnosis then tests on the last
+    /// both. A column `excitation_share` is the excitation of the bridge as a share of the nominal one, the same throughout a
+    /// trial; 1 if it is missing. Without a test trial nothing is held back here: the diagnosis then tests on the last
     /// part of each trial.
     ///
     /// # Errors
     /// Columns that are missing or whose values do not fit their names, trials of different rates,
     /// too few samples to fit.
     pub fn new(trials: &[SessionTrial]) -> Result<Self, ProblemError> {
-        let (trials, cut) = shortened(trials, OUTPUTS)?;
         let with = trials.iter().filter(|t| t.trial.channel(PRESSURE).is_some()).count();
         let has_pressure = with == trials.len();
-        if trials.iter().all(|t| t.split == Split::Test) {
-            let hint = "give at least one trial that is not a test trial";
-            return Err(ProblemError::too_little("there is no trial to fit", hint));
-        }
-        let shares: Vec<f64> = trials.iter().map(excitation).collect::<Result<_, _>>()?;
-        // Outliers are replaced before resampling, because resampling would spread an outlier over
-        // its neighbours.
-        let (trials, outlier_notes) = without_isolated_outliers(trials.into_owned());
-        let names = NEEDED.into_iter().chain(has_pressure.then_some(PRESSURE));
-        let mut columns = Columns::even(&trials, names.map(str::to_owned).collect(), SHORTEST)?;
-        check_rate(columns.dt_s)?;
-        columns.notes.splice(0..0, cut);
-        columns.notes.extend(outlier_notes);
+        let names = NEEDED.into_iter().chain(has_pressure.then_some(PRESSURE)).map(str::to_owned);
+        let mut columns =
+            Columns::built_in(trials, names.collect(), &MEASURED, MEASURED.len(), true)?;
         if with > 0 && !has_pressure {
             columns.notes.push(format!(
                 "only {with} of {} trials have a pressure column: it is left out",
                 trials.len()
             ));
         }
-        columns.mark_undetermined(true);
-        let excitation = columns.sources.iter().map(|source| shares[*source]).collect();
+        let share = |source: &usize| {
+            let trial = &trials[*source].trial;
+            let named = |error| ProblemError::Refused(format!("{}, {error}", trial.name));
+            excitation_share(trial).map_err(named)
+        };
+        let excitation = columns.sources.iter().map(share).collect::<Result<_, _>>()?;
         let session = Self { columns, excitation };
-        session.check()?;
+        session.check_units()?;
         Ok(session)
     }
 
@@ -118,14 +104,6 @@ impl RigSession {
         self.columns.dt_s
     }
 
-    fn check(&self) -> Result<(), ProblemError> {
-        let fit: usize = self.trials().iter().filter(|t| !t.is_test).map(|t| t.samples).sum();
-        if fit < LEAST {
-            return Err(ProblemError::few_samples(fit, LEAST));
-        }
-        self.check_units()
-    }
-
     /// Whether the voltage is a copy of another column. The diagnosis reports a copy, so its unit
     /// is not checked.
     fn is_copied(&self) -> bool {
@@ -142,73 +120,61 @@ impl RigSession {
 
     fn check_units(&self) -> Result<(), ProblemError> {
         let range = |column: &str| ends(self.column(column));
-        let (length, volts) = (range(LENGTH), range(VOLTAGE));
-        let bad =
-            |column: &str, found: String, hint: &str| Err(ProblemError::value(column, found, hint));
-        let spread = |(low, high): (f64, f64)| format!("values from {low} to {high}");
-        if length.1 < 10.0 && volts.1 > 10.0 {
-            let hint = "length_mm and bridge_v look swapped: exchange the two names";
-            return bad("length_mm", spread(length), hint);
-        }
-        if length.1 < 1.0 && length.0 > 0.0 {
-            return bad("length_mm", spread(length), "this looks like metres: multiply by 1000");
-        }
-        if volts.1 > 50.0 && !self.is_copied() {
-            return bad("bridge_v", spread(volts), "this looks like millivolts: divide by 1000");
-        }
-        for (column, range) in [("length_mm", length), ("bridge_v", volts)] {
-            if range.1 - range.0 <= 0.0 {
+        let (length, volts, pressure) = (range(LENGTH), range(VOLTAGE), range(PRESSURE));
+        let has_pressure = self.columns.of(PRESSURE).is_some();
+        let span = pressure.1 - pressure.0;
+        for (column, range) in [(LENGTH, length), (VOLTAGE, volts), (PRESSURE, pressure)] {
+            if range.1 <= range.0 && (column != PRESSURE || has_pressure) {
                 return Err(ProblemError::dead(column, format!("{} in every sample", range.0)));
             }
         }
+        // Noise alone does not show a unit; the diagnosis reports that the channel is dead.
+        let shows_unit = has_pressure && !self.is_noise(PRESSURE, span);
         let openings = VALVES.map(range);
-        for (column, range) in VALVES.into_iter().zip(openings) {
-            if range.0 < 0.0 || range.1 > 1.0 {
-                return bad(column, spread(range), "an opening is a number from 0 to 1");
+        let is_beyond = |(low, high): (f64, f64)| low < 0.0 || high > 1.0;
+        let opening = "an opening is a number from 0 to 1";
+        let is_shut = openings.iter().all(|range| range.1 <= 0.0);
+        let wrong = [
+            (
+                length.1 < 10.0 && volts.1 > 10.0,
+                (LENGTH, length),
+                "length_mm and bridge_v look swapped: exchange the two names",
+            ),
+            (
+                length.1 < 1.0 && length.0 > 0.0,
+                (LENGTH, length),
+                "this looks like metres: multiply by 1000",
+            ),
+            (
+                volts.1 > 50.0 && !self.is_copied(),
+                (VOLTAGE, volts),
+                "this looks like millivolts: divide by 1000",
+            ),
+            (is_beyond(openings[0]), (VALVES[0], openings[0]), opening),
+            (is_beyond(openings[1]), (VALVES[1], openings[1]), opening),
+            (
+                is_shut,
+                ("inlet, outlet", openings[0]),
+                "no valve ever opens: check the columns inlet and outlet",
+            ),
+            (
+                shows_unit && pressure.1 > 10_000.0,
+                (PRESSURE, pressure),
+                "this looks like Pa: divide by 1000",
+            ),
+            (
+                shows_unit && pressure.1 < 20.0,
+                (PRESSURE, pressure),
+                "this looks like bar: multiply by 100",
+            ),
+        ];
+        match wrong.into_iter().find(|(is_wrong, ..)| *is_wrong) {
+            None => self.check_directions(),
+            Some((_, (column, (low, high)), hint)) => {
+                Err(ProblemError::value(column, format!("values from {low} to {high}"), hint))
             }
         }
-        if openings.iter().all(|range| range.1 <= 0.0) {
-            let hint = "no valve ever opens: check the columns inlet and outlet";
-            return bad("inlet, outlet", "0 in every sample".into(), hint);
-        }
-        if self.columns.of(PRESSURE).is_some() {
-            let pressure = range(PRESSURE);
-            if pressure.1 - pressure.0 <= 0.0 {
-                let hint = "the channel is dead: check the sensor, or take the column out";
-                return bad("pressure_kpa", format!("{} in every sample", pressure.0), hint);
-            }
-            // Noise alone does not show a unit; the diagnosis reports that the channel is dead.
-            if self.is_noise(PRESSURE, pressure.1 - pressure.0) {
-                return self.check_directions();
-            }
-            if pressure.1 > 10_000.0 {
-                return bad("pressure_kpa", spread(pressure), "this looks like Pa: divide by 1000");
-            }
-            if pressure.1 < 20.0 {
-                return bad(
-                    "pressure_kpa",
-                    spread(pressure),
-                    "this looks like bar: multiply by 100",
-                );
-            }
-        }
-        self.check_directions()
     }
-}
-
-/// Share of the nominal excitation that a trial was recorded at.
-fn excitation(one: &SessionTrial) -> Result<f64, ProblemError> {
-    let Some(shares) = one.trial.channel(EXCITATION) else { return Ok(1.0) };
-    let share = shares.first().copied().unwrap_or(1.0);
-    let is_sound = share > 0.0 && share <= 2.0 && shares.iter().all(|s| *s == share);
-    is_sound.then_some(share).ok_or_else(|| {
-        let (low, high) = ends(shares);
-        ProblemError::value(
-            format!("{}, {EXCITATION}", one.trial.name),
-            format!("values from {low} to {high}"),
-            "give the share of the nominal excitation, one number in every row of a trial",
-        )
-    })
 }
 
 /// Limit of the motion against the valves: a recording is refused if the muscle lengthens while the inlet is open, or

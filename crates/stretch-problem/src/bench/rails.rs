@@ -1,12 +1,9 @@
 //! Channels that are saturated at an end of the recorder's range.
 
-use stretch_calibrate::PRESSURE;
-use stretch_data::ends;
+use stretch_data::{after_number, ends, unit_of};
 use stretch_filter::log::{noise_of_differences, second_differences};
-use stretch_sim::{Key, RigParams};
 
-use super::session::{LENGTH, VOLTAGE};
-use crate::bench::columns::Columns;
+use super::columns::Columns;
 
 /// Share of the samples at one value above which chance does not explain the repeated value.
 const SHARE: f64 = 0.002;
@@ -14,30 +11,23 @@ const SHARE: f64 = 0.002;
 /// value at rest.
 const NOISY: f64 = 0.3;
 
-/// A sentence for every end of a channel that holds more samples than noise explains.
-pub(super) fn rails(params: &RigParams, columns: &Columns) -> Vec<String> {
-    let channels = [
-        (VOLTAGE, "V", params[Key::SigmaV]),
-        (LENGTH, "mm", params[Key::SigmaL]),
-        (PRESSURE, "kPa", 1e-3 * params[Key::SigmaP]),
-    ];
-    let mut said = Vec::new();
-    for (column, unit, sigma) in channels {
-        let values = columns.all(column);
-        let (low, high) = ends(values);
-        for (end, which) in [(low, "least"), (high, "greatest")] {
-            let share =
-                values.iter().filter(|v| **v == end).count() as f64 / values.len().max(1) as f64;
-            if share > SHARE && noise_off(values, end) > NOISY * sigma {
-                said.push(format!(
-                    "{column} is at {end} {unit}, its {which} value, in {:.1} % of the samples: its recorder looks saturated, \
-                     and all values beyond it are lost; change range, gain or zero",
-                    100.0 * share
-                ));
-            }
-        }
-    }
-    said
+/// A sentence for every end of a column that holds more samples than noise explains; `noise` is that of its recorder.
+pub(crate) fn rails(columns: &Columns, name: &str, noise: f64) -> Vec<String> {
+    let values = columns.all(name);
+    let (low, high) = ends(values);
+    let rail = |(end, which): (f64, &str)| {
+        let count = values.iter().filter(|v| **v == end).count();
+        let share = count as f64 / values.len().max(1) as f64;
+        (share > SHARE && noise_off(values, end) > NOISY * noise).then(|| {
+            format!(
+                "{name} is at {end}{}, its {which} value, in {:.1} % of the samples: its recorder looks saturated, and all values \
+                 beyond it are lost; change range, gain or zero",
+                after_number(&unit_of(name)),
+                100.0 * share
+            )
+        })
+    };
+    [(low, "least"), (high, "greatest")].into_iter().filter_map(rail).collect()
 }
 
 /// Noise of a channel from its median second difference, without the samples at one value.
@@ -50,6 +40,7 @@ fn noise_off(values: &[f64], end: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use stretch_data::{Channel, SessionTrial, Trial};
+    use stretch_sim::{Key, RigParams};
 
     use super::*;
     use crate::RigSession;
@@ -75,7 +66,7 @@ mod tests {
                 ],
             };
             let session = RigSession::new(&[SessionTrial::new(trial)]).expect("a session");
-            rails(&RigParams::default(), &session.columns)
+            rails(&session.columns, "bridge_v", RigParams::default()[Key::SigmaV])
         };
         assert!(said(at(9.0, 0.01)).is_empty());
         let clipped = said(at(0.5, 0.01));

@@ -8,13 +8,15 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use rayon::prelude::*;
-use stretch_calibrate::{CalibrateError, ModelKind, Options, apply, calibrate};
+use stretch_calibrate::{CalibrateError, ModelKind, Options, calibrate, evaluate_errors};
 use stretch_core::Degree;
-use stretch_data::{Channel, Trial, ends};
+use stretch_data::{Trial, ends};
 use stretch_gap::{
     Evidence, GapError, Model, Noise, RandomGenerator, Role, Run, SampleRoles, Simulator, Transfer,
     TransferError,
 };
+
+use crate::bench::even_trial;
 
 const SIGNAL: &str = "signal";
 const REFERENCE: &str = "reference";
@@ -142,18 +144,12 @@ fn trials(records: &Records, roles: &SampleRoles, dt_s: f64, is_test: bool) -> V
             _ => spans.push((segment.trial, segment.from, segment.to)),
         }
     }
-    let channel = |name: &str, values: &[f64]| Channel { name: name.into(), values: values.into() };
-    spans
-        .into_iter()
-        .map(|(trial, from, to)| Trial {
-            name: format!("trial {}", trial + 1),
-            time_s: (0..to - from).map(|i| i as f64 * dt_s).collect(),
-            channels: vec![
-                channel(REFERENCE, &records.reference[from..to]),
-                channel(SIGNAL, &records.signal[from..to]),
-            ],
-        })
-        .collect()
+    let part = |(trial, from, to): (usize, usize, usize)| {
+        let column = |name: &str, values: &[f64]| (name.to_owned(), values[from..to].to_vec());
+        let columns = [column(REFERENCE, &records.reference), column(SIGNAL, &records.signal)];
+        even_trial(&format!("trial {}", trial + 1), dt_s, columns)
+    };
+    spans.into_iter().map(part).collect()
 }
 
 /// Root mean square error on the test trials of a calibration that runs live.
@@ -165,15 +161,5 @@ fn error(kind: ModelKind, trained: &[Trial], tested: &[Trial]) -> Result<f64, Ca
         ..Options::default()
     };
     let calibration = calibrate(trained, &options)?.calibration;
-    let (mut sum, mut count) = (0.0, 0_usize);
-    for trial in tested {
-        let readings = apply(&calibration, trial)?.readings;
-        for (reading, truth) in readings.iter().zip(trial.require(REFERENCE)?) {
-            if let Ok(reading) = reading {
-                sum += (reading.estimate - truth).powi(2);
-                count += 1;
-            }
-        }
-    }
-    Ok((sum / count as f64).sqrt())
+    Ok(evaluate_errors(&[("", &calibration)], tested)?.pooled[1].rmse)
 }

@@ -86,12 +86,12 @@ impl Bench {
     }
 }
 
-/// Checks that every sample of a simulated stage is finite.
-pub(crate) fn finite(stage: &str, samples: &[f64]) -> Result<(), ProblemError> {
-    match samples.iter().all(|x| x.is_finite()) {
-        true => Ok(()),
-        false => Err(ProblemError::Refused(format!(
-            "{stage}: the simulation gave a number that is not finite; a parameter of the rig is too large or too small"
+/// Offset and slope of the straight line of y over x by least squares, from pairs (x, y). The slope is `flat` if x or y
+/// never changes.
+pub(crate) fn straight_line<I: Iterator<Item = (f64, f64)>>(
+    pairs: impl Fn() -> I,
+    flat: f64,
+) -> (f64, f64) {
     let (n, x, y) = pairs().fold((0.0_f64, 0.0, 0.0), |(n, a, b), (x, y)| (n + 1.0, a + x, b + y));
     let (mean_x, mean_y) = (x / n.max(1.0), y / n.max(1.0));
     let (xx, xy) = pairs().fold((0.0, 0.0), |(xx, xy), (x, y)| {
@@ -101,16 +101,6 @@ pub(crate) fn finite(stage: &str, samples: &[f64]) -> Result<(), ProblemError> {
     (mean_y - slope * mean_x, slope)
 }
 
-        ))),
-    }
-}
-
-/// Offset and slope of the straight line of y over x by least squares, from pairs (x, y). The slope is `flat` if x or y
-/// never changes.
-pub(crate) fn straight_line<I: Iterator<Item = (f64, f64)>>(
-    pairs: impl Fn() -> I,
-    flat: f64,
-) -> (f64, f64) {
 /// A trial of named columns with a value every `dt_s` seconds.
 pub(crate) fn even_trial(
     name: &str,

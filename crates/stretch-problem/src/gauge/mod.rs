@@ -10,6 +10,7 @@ use stretch_data::{SessionTrial, unit_of};
 use stretch_gap::{
     Description, GapError, Line, Model, Noise, ParameterSpec, Run, Simulator, StageSpec,
 };
+use stretch_metrics::lag;
 use stretch_sim::{
     Alone, Catalogue, Effect, EffectSet, Gauge, GaugeRig, GaugeSpec, Start, Tolerance,
 };
@@ -21,7 +22,6 @@ use crate::{
     bench::{
         Bench, Place,
         columns::Columns,
-        finite,
         smooth::{MeasuredInput, Smoothed, unscheduled},
         straight_line,
     },
@@ -115,7 +115,7 @@ impl GaugeSimulator {
         let (least, greatest) = columns.range(y);
         let [x_noise, y_noise] = [x, y].map(|values| noise(&columns, values));
         let input = smoothed(&columns, x, x_noise);
-        let alone = alone(&columns);
+        let alone = alone(&columns, rig.spec.gain);
         let has_pressure = rig.spec.pressure_scale.is_some();
         let place = |effect: &'static Effect| {
             let (touches, search) = (vec![0], Gauge::search(effect, &alone));
@@ -162,7 +162,7 @@ impl GaugeSimulator {
             let rest_s = (next - trial.start_s - trial.samples as f64 * dt_s).max(0.0);
             start = Start::Carried { rest_s };
         }
-        finite("sensing", out)
+        Ok(())
     }
 }
 
@@ -227,10 +227,18 @@ fn parameters(rig: &GaugeRig, signal: &str, is_evidence: bool) -> Vec<ParameterS
     ]
 }
 
-fn alone(columns: &Columns) -> Alone {
+/// Longest lag that is looked for, s.
+const REACH_S: f64 = 1.0;
+
+/// The length of the session, and the time by which the signal trails the reference.
+fn alone(columns: &Columns, gain: f64) -> Alone {
     let longest = columns.fitted().max_by_key(ExactSizeIterator::len).unwrap_or(0..0);
+    let reach = ((REACH_S / columns.dt_s) as usize).min(longest.len() / 4);
     let [x, y] = [REFERENCE, SIGNAL].map(|column| &columns.values[column][longest.clone()]);
-    Alone { session_s: columns.session_s(), lag_s: lag_s(x, y, columns.dt_s) }
+    // The signal may fall while the reference rises.
+    let rising: Vec<f64> = y.iter().map(|y| gain.signum() * y).collect();
+    let samples = lag(x, &rising, reach).map_or(0.0, |lag| lag.samples);
+    Alone { session_s: columns.session_s(), lag_s: samples * columns.dt_s }
 }
 
 /// Offset and gain of the straight line of the signal over e, in the trials that are fitted.
@@ -240,28 +248,4 @@ fn line(columns: &Columns, spec: &GaugeSpec) -> (f64, f64) {
     let pairs =
         || columns.fitted().flat_map(|r| x[r.clone()].iter().map(e).zip(y[r].iter().copied()));
     straight_line(pairs, 1.0)
-}
-
-/// Longest lag that is looked for, s.
-const REACH_S: f64 = 1.0;
-
-/// Time by which `y` trails `x`, s: the lag within [`REACH_S`] at which `x` and `y` correlate best.
-fn lag_s(x: &[f64], y: &[f64], dt_s: f64) -> f64 {
-    let reach = ((REACH_S / dt_s) as usize).min(x.len() / 4);
-    if reach == 0 {
-        return 0.0;
-    }
-    let centre = |v: &[f64]| {
-        let mean = v.iter().sum::<f64>() / v.len() as f64;
-        v.iter().map(|v| v - mean).collect::<Vec<f64>>()
-    };
-    let middle = centre(&y[reach..y.len() - reach]);
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-    let size = |shift: usize| {
-        let there = centre(&x[shift..shift + middle.len()]);
-        let power = dot(&there, &there).max(f64::MIN_POSITIVE);
-        dot(&there, &middle).powi(2) / power
-    };
-    let best = (0..=2 * reach).max_by(|a, b| size(*a).total_cmp(&size(*b))).unwrap_or(reach);
-    (reach as f64 - best as f64) * dt_s
 }

@@ -10,7 +10,7 @@ use stretch_sim::{
 
 use super::{RigSimulator, nominal::TunedRig, session::Begin, timing};
 use crate::{
-    bench::{Acting, finite, smooth::cubic},
+    bench::{Acting, smooth::cubic},
     error::ProblemError,
 };
 
@@ -80,12 +80,11 @@ pub(super) fn simulate(
         kind,
     };
     match kind {
-        RigStage::Pneumatics => setting.pneumatics(run.trials, out)?,
-        RigStage::Muscle => setting.muscle(run.trials, out)?,
-        RigStage::Sensing => setting.sensing(run.trials, &acting, out)?,
-        _ => setting.actuation(run.trials, out)?,
+        RigStage::Pneumatics => setting.pneumatics(run.trials, out),
+        RigStage::Muscle => setting.muscle(run.trials, out),
+        RigStage::Sensing => setting.sensing(run.trials, &acting, out),
+        _ => setting.actuation(run.trials, out),
     }
-    finite(&rig.bench.about.stages[run.stage].name, out)
 }
 
 /// A part of the session that a stage runs over.
@@ -151,20 +150,24 @@ impl Setting<'_> {
         Ok(())
     }
 
-    /// Sets the initial state of the reference, which follows the muscle.
-    pub(super) fn set_reference_state(
+    /// The reference, which follows the muscle, after lengths from `before` the session and in its initial state.
+    pub(super) fn reference(
         &self,
-        shown: &mut ReferenceSensor,
-        length: &[f64],
-    ) -> Result<(), ProblemError> {
-        let ReferenceSensor { stage, memory, .. } = shown;
-        let mut out = vec![0.0; length.len()];
+        effects: &EffectSet,
+        before: &[f64],
+        first: &[f64],
+    ) -> Result<ReferenceSensor, ProblemError> {
+        let mut shown = self.shown(effects)?;
+        let ReferenceSensor { stage, memory, .. } = &mut shown;
+        let (mut filled, mut begun) = (vec![0.0; before.len()], vec![0.0; first.len()]);
+        stage.run(memory, Start::Settled, before, &mut filled)?;
         self.set_initial_state(
             self.tuned.initial_muscle,
             memory,
             stage.memory(),
-            |memory, start| Ok(stage.run(memory, start, length, &mut out)?),
-        )
+            |memory, start| Ok(stage.run(memory, start, first, &mut begun)?),
+        )?;
+        Ok(shown)
     }
 
     fn is_vented(&self) -> bool {
@@ -333,14 +336,12 @@ impl Setting<'_> {
         fresh: impl Fn() -> Memory,
         run: impl Fn(&mut Memory, Start, At, &mut [f64]) -> Result<(), ProblemError>,
     ) -> Result<(), ProblemError> {
-        let (mut memory, mut shown) = (fresh(), self.shown(&self.effects)?);
-        let (mut filled, mut begun) = ([0.0; 2], [0.0]);
+        let (mut memory, mut filled, mut begun) = (fresh(), [0.0; 2], [0.0]);
         run(&mut memory, Start::Settled, At::Before, &mut filled)?;
-        shown.condition(&filled)?;
         self.set_initial_state(self.initial_share, &mut memory, fresh(), |memory, start| {
             run(memory, start, At::First, &mut begun)
         })?;
-        self.set_reference_state(&mut shown, &begun)?;
+        let mut shown = self.reference(&self.effects, &filled, &begun)?;
         self.each(count, out, |trial, own| {
             run(&mut memory, self.start(trial), At::Trial(trial), own)?;
             shown.run(self.start(trial), own)
@@ -437,7 +438,7 @@ impl Setting<'_> {
             .collect()
     }
 
-    pub(super) fn shown(&self, effects: &EffectSet) -> Result<ReferenceSensor, ProblemError> {
+    fn shown(&self, effects: &EffectSet) -> Result<ReferenceSensor, ProblemError> {
         ReferenceSensor::new(&self.tuned.params, effects, self.rig.bench.about.dt_s)
     }
 }
@@ -456,11 +457,6 @@ impl ReferenceSensor {
         let acts = effects.acting_in(RigStage::Reference).next().is_some();
         let memory = stage.memory();
         Ok(Self { stage, memory, acts, work: Vec::new() })
-    }
-
-    pub(super) fn condition(&mut self, length: &[f64]) -> Result<(), ProblemError> {
-        let mut out = vec![0.0; length.len()];
-        Ok(self.stage.run(&mut self.memory, Start::Settled, length, &mut out)?)
     }
 
     pub(super) fn run(&mut self, start: Start, length: &mut [f64]) -> Result<(), ProblemError> {

@@ -47,10 +47,8 @@ impl Setting<'_> {
             return Ok(None);
         }
         let mut free = self.free_length(count)?.to_vec();
-        let mut shown = self.shown(&alone)?;
-        shown.condition(&[self.before_mm(); 2])?;
         let first = free.first().and_then(|trial| trial.get(..1)).unwrap_or(&[]);
-        self.set_reference_state(&mut shown, first)?;
+        let mut shown = self.reference(&alone, &[self.before_mm(); 2], first)?;
         for (trial, own) in free.iter_mut().enumerate() {
             let before = own.clone();
             shown.run(self.start(trial), own)?;

@@ -149,10 +149,7 @@ pub fn predict(
         let hint = "give the file that stretch diagnose --fix wrote: it has [[wrapped]] entries, or an [[effect]] with a value";
         return Err(ProblemError::value(&shown, "it holds no effect that was found", hint));
     }
-    if let Some(announce) = reading.announce {
-        let (program, folder) = (workers.shown(), workers.folder.display());
-        announce(&format!("{shown} runs this program in the folder {folder}: {program}"));
-    }
+    reading.announce(fixed, &workers);
     let mut spec = file.load()?;
     let fitted = spec.trials.len();
     for path in new {

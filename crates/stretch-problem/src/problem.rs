@@ -15,7 +15,7 @@ use crate::{
     implement::Implementation,
     rig::RigSimulator,
     sensors::read_sensors,
-    worker::Workers,
+    worker::{Workers, WorkersSpec},
 };
 
 /// A simulator with its recordings that provides everything [`Problem::examine`] needs. A new kind
@@ -91,6 +91,17 @@ pub struct Reading<'a> {
     pub without: &'a [String],
     /// Called before a program runs, with one line that names the program.
     pub announce: Option<fn(&str)>,
+}
+
+impl Reading<'_> {
+    /// Names the program that a problem's file runs, before it runs.
+    pub(crate) fn announce(&self, path: &Path, workers: &WorkersSpec) {
+        if let Some(announce) = self.announce {
+            let (path, folder) = (path.display(), workers.folder.display());
+            let program = workers.shown();
+            announce(&format!("{path} runs this program in the folder {folder}: {program}"));
+        }
+    }
 }
 
 impl Problem {
@@ -178,13 +189,7 @@ impl Problem {
                 "{inside}: it names a program to run ({program}), but no program is run for a folder; if you trust it, give the file itself, {inside}"
             )));
         }
-        if let Some(announce) = reading.announce {
-            let folder = workers.folder.display();
-            announce(&format!(
-                "{} runs this program in the folder {folder}: {program}",
-                path.display()
-            ));
-        }
+        reading.announce(path, &workers);
         let (checked, source) = Workers::bound(file.load_as(&recorded)?, workers)?;
         let name = file.shown_name().to_owned();
         let own = BlackBox::within(checked, Arc::new(source), file.budget.map(NonZeroUsize::get));

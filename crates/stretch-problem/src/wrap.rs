@@ -13,7 +13,7 @@ use stretch_effects::{
 use stretch_gap::EffectSpec;
 
 use crate::{
-    bench::columns::Columns,
+    bench::{columns::Columns, too_slow},
     black_box::{SessionPart, StageEntry, checked::StageRecord},
     error::ProblemError,
 };
@@ -116,13 +116,7 @@ pub(crate) fn placed(
     all.retain(|p| p.aliases.iter().any(|a| patterns.contains(a)));
     all.retain_mut(|p| {
         let needed = p.shown_at(rate_hz);
-        notes.extend(needed.map(|needed| {
-            format!(
-                "{} is not looked for, because at {rate_hz:.4} samples a second it cannot be distinguished from other causes; record at \
-                 least {needed} samples a second",
-                p.name
-            )
-        }));
+        notes.extend(needed.map(|needed| too_slow(&p.name, rate_hz, needed)));
         needed.is_none()
     });
     Ok(all)

@@ -22,7 +22,7 @@ pub(crate) use acting::Acting;
 pub(crate) use built_in::BuiltIn;
 use columns::Columns;
 use specs::shown;
-pub(crate) use specs::{Place, skew_of};
+pub(crate) use specs::{Place, skew_of, too_slow};
 
 /// A simulator of the catalogue's effects with its recording.
 #[derive(Debug, Clone)]

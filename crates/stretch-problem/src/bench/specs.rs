@@ -42,6 +42,14 @@ pub(crate) fn skew_of(about: &Description, usual: [f64; 2]) -> [f64; 2] {
     skew.and_then(|e| e.parameters.first()).map_or(usual, |p| [p.min, p.max])
 }
 
+/// A note on an effect that a sample rate (Hz) cannot show, because it needs another one.
+pub(crate) fn too_slow(name: &str, rate_hz: f64, needed_hz: f64) -> String {
+    format!(
+        "{name} is not looked for, because at {rate_hz:.4} samples a second it cannot be distinguished from other causes; record at \
+         least {needed_hz} samples a second"
+    )
+}
+
 /// Effects that a recording of this sample time can show, and their entries for the diagnosis; a note for each other
 /// effect says why it is left out.
 pub(super) fn shown(
@@ -52,14 +60,11 @@ pub(super) fn shown(
     let rate_hz = 1.0 / dt_s;
     effects
         .filter_map(|(effect, mut place)| {
-            let Some(needed) = place.search.at_rate(|values| effect.least_rate_hz(values), rate_hz) else {
+            let Some(needed) = place.search.at_rate(|values| effect.least_rate_hz(values), rate_hz)
+            else {
                 return Some((effect, spec(effect, place)));
             };
-            notes.push(format!(
-                "{} is not looked for, because at {rate_hz:.4} samples a second it cannot be distinguished from motion and drift; \
-                 record at least {needed} samples a second",
-                effect.name
-            ));
+            notes.push(too_slow(effect.name, rate_hz, needed));
             None
         })
         .unzip()

@@ -18,7 +18,7 @@ use std::path::Path;
 use stretch_calibrate::PRESSURE;
 use stretch_data::DataSet;
 use stretch_gap::{Description, Distortion, GapError, Line, Model, Run, Simulator};
-use stretch_recording::ReadOptions;
+use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::{
     Bridge, Catalogue, Effect, Extent, Key, Place as EffectPlace, Rig, RigParams, RigStage, Search,
     Tolerance,
@@ -29,7 +29,7 @@ use facts::facts;
 use noises::Noises;
 use nominal::{TunedParameter, parameters, stages};
 pub use session::RigSession;
-use session::{Inputs, LENGTH, VOLTAGE};
+use session::{Inputs, LENGTH, NEEDED, VOLTAGE};
 
 use crate::{
     bench::{Bench, Place, columns::Columns, rails::rails, read_rig, smooth::MeasuredInput},
@@ -67,7 +67,7 @@ impl RigSimulator {
     /// Reads a data set's folder: its trials, and its rig file unless another is given.
     ///
     /// # Errors
-    /// A rig file that cannot be read, and as [`RigSession::read`] and [`RigSimulator::new`].
+    /// Files that cannot be read, and as [`RigSession::new`] and [`RigSimulator::new`].
     pub fn read(
         folder: &Path,
         rig: Option<&Path>,
@@ -81,7 +81,8 @@ impl RigSimulator {
             .map(|path| read_rig(path, Rig::from_file))
             .transpose()?
             .unwrap_or_default();
-        let session = RigSession::read(folder, &set, recorded)?;
+        let options = NEEDED.iter().fold(recorded, |options, name| options.require(*name));
+        let session = RigSession::new(&Recording::session(&set, folder, &options)?)?;
         Self::new(RigSetup { session, rig, catalogue })
     }
 
@@ -109,9 +110,10 @@ impl RigSimulator {
         };
         let (parameters, tuned) = parameters(&rig, &stage_kinds);
         let stages = stages(&stage_kinds, &tuned, &noises);
-        let extents = Extents::of(&rig.params, &inputs, &columns);
+        let [strain, volts] = extents(&rig.params, &inputs, &columns);
         let place = |effect: &'static Effect| {
-            let search = Search::of(effect, extents.at(effect));
+            let is_of_volts = matches!(effect.at(), Some((_, EffectPlace::Volts)));
+            let search = Search::of(effect, if is_of_volts { &volts } else { &strain });
             (effect, Place { touches: touched(&stage_kinds, effect.stage), search, unit: |_| 1.0 })
         };
         let (candidates, sensor) = (catalogue.iter().map(place), (noises.volts.sd(), 1.0));
@@ -190,30 +192,12 @@ fn touched(kinds: &[RigStage], stage: RigStage) -> Vec<usize> {
 /// Share of the samples at either end of the voltage that are left out as noise.
 const OUTERMOST: f64 = 0.002;
 
-/// Range of the voltage over the fit samples, and range of the strain over all trials.
-struct Extents {
-    volts: Extent,
-    strain: Extent,
-}
-
-impl Extents {
-    fn of(params: &RigParams, inputs: &Inputs, columns: &Columns) -> Self {
-        let all = columns.all(VOLTAGE);
-        let mut volts: Vec<f64> = columns.fitted().flat_map(|r| &all[r]).copied().collect();
-        volts.sort_by(f64::total_cmp);
-        let at = |q: f64| volts[(q * (volts.len() - 1) as f64) as usize];
-        let strain = Bridge::new(params).strain(inputs.stroke.0);
-        Self {
-            volts: Extent::between(at(OUTERMOST), at(1.0 - OUTERMOST)),
-            strain: Extent::between(strain, params[Key::E0]),
-        }
-    }
-
-    /// The range of the channel that an effect acts on.
-    fn at(&self, effect: &Effect) -> &Extent {
-        match effect.at() {
-            Some((_, EffectPlace::Volts)) => &self.volts,
-            _ => &self.strain,
-        }
-    }
+/// Range of the strain over all trials, and range of the voltage over the fit samples.
+fn extents(params: &RigParams, inputs: &Inputs, columns: &Columns) -> [Extent; 2] {
+    let all = columns.all(VOLTAGE);
+    let mut volts: Vec<f64> = columns.fitted().flat_map(|r| &all[r]).copied().collect();
+    volts.sort_by(f64::total_cmp);
+    let at = |q: f64| volts[(q * (volts.len() - 1) as f64) as usize];
+    let strain = Bridge::new(params).strain(inputs.stroke.0);
+    [Extent::between(strain, params[Key::E0]), Extent::between(at(OUTERMOST), at(1.0 - OUTERMOST))]
 }

@@ -241,15 +241,11 @@ impl Setting<'_> {
     pub(super) fn each(
         &self,
         count: usize,
-        mut out: &mut [f64],
+        out: &mut [f64],
         mut visit: impl FnMut(usize, &mut [f64]) -> Result<(), ProblemError>,
     ) -> Result<(), ProblemError> {
-        for (trial, spec) in self.rig.bench.about.trials[..count].iter().enumerate() {
-            let (own, rest) = out.split_at_mut(spec.samples);
-            visit(trial, own)?;
-            out = rest;
-        }
-        Ok(())
+        let mut ranges = self.rig.bench.columns.ranges[..count].iter().enumerate();
+        ranges.try_for_each(|(trial, range)| visit(trial, &mut out[range.clone()]))
     }
 
     pub(super) fn pneumatics(&self, count: usize, out: &mut [f64]) -> Result<(), ProblemError> {

@@ -1,11 +1,10 @@
 //! The measured session: trials as a rig needs them, checked.
 
-use std::{ops::Range, path::Path};
+use std::ops::Range;
 
 use stretch_calibrate::PRESSURE;
-use stretch_data::{DataSet, SessionTrial, ends};
+use stretch_data::{SessionTrial, ends};
 use stretch_gap::{Noise, TrialSpec, copied, noise_variance};
-use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::excitation_share;
 
 use super::{
@@ -27,7 +26,7 @@ pub(super) const VALVES: [&str; 2] = ["inlet", "outlet"];
 pub(super) const LENGTH: &str = "length_mm";
 pub(super) const VOLTAGE: &str = "bridge_v";
 /// Columns that a rig needs; the pressure is optional.
-const NEEDED: [&str; 4] = [VALVES[0], VALVES[1], LENGTH, VOLTAGE];
+pub(super) const NEEDED: [&str; 4] = [VALVES[0], VALVES[1], LENGTH, VOLTAGE];
 /// Columns of sensors, each of which is a simulated output.
 const MEASURED: [&str; 3] = [PRESSURE, LENGTH, VOLTAGE];
 /// Range that noise alone hardly ever reaches, standard deviations.
@@ -42,15 +41,6 @@ pub struct RigSession {
 }
 
 impl RigSession {
-    /// Reads every trial of a data set.
-    ///
-    /// # Errors
-    /// Files that cannot be read, and as [`RigSession::new`].
-    pub fn read(folder: &Path, set: &DataSet, recorded: ReadOptions) -> Result<Self, ProblemError> {
-        let options = NEEDED.iter().fold(recorded, |options, name| options.require(*name));
-        Self::new(&Recording::session(set, folder, &options)?)
-    }
-
     /// Binds trials with the columns `inlet`, `outlet` (0..1), `length_mm`, `bridge_v` and, if it
     /// was recorded, `pressure_kpa`. The trials are brought onto one even grid ([`EvenSession`](stretch_data::EvenSession)):
     /// lost samples are bridged, a long gap in time splits a trial into two, and the notes name

@@ -47,7 +47,7 @@ use crate::{
         notes::{
             answer_notes, dead_parameters_note, detection_limit_note, extrapolation_notes,
             friction_note, gross_error_notes, implausible_noise_notes, lost_note, not_fitted_note,
-            recorder_notes, retuning_notes, start_notes, swing_notes,
+            recorder_notes, retuning_notes, start_notes,
         },
     },
 };
@@ -495,11 +495,6 @@ fn report(
         notes.extend(own.chain(retuning_notes(simulator, &evidence)).map(Note::from));
     }
     notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
-    // Note oscillations of parameters only if little gap is left, because the residual of an effect
-    // of another form may look like one.
-    if is_quiet || evidence.gap.left <= thresholds.unknown_excess {
-        notes.extend(swing_notes(cause.problem, &evidence).into_iter().map(Note::from));
-    }
     let model_runs = runs.counted();
     let spent = model_runs.and_then(|runs| runs.note());
     let cut_short = spent.is_some().then(|| searched.not_looked_at());

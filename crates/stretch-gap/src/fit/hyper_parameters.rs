@@ -50,31 +50,47 @@ impl Metric {
         let (mut best, mut gained) = (self.clone(), 0.0);
         for which in 0..self.loose().len() {
             let own = best.loose()[which].level;
-            let levels = hypotheses(&best.loose()[which]).chain(beyond(&best.loose()[which]));
-            let levels = levels.chain([own]);
-            let one = |level| best.with(|i, own| if i == which { level } else { own }, roles);
-            let levels: Vec<Level> = levels.collect();
-            // A metric needs much memory. Therefore each one is built twice instead of keeping the
-            // metrics of all levels.
-            let noise = levels.par_iter().map(|level| one(*level).spectral_level(roles, residual));
-            let noise = noise.reduce(|| f64::INFINITY, f64::min).max(1.0).sqrt();
-            let fit = |m: &Self| m.beside(roles, residual, noise);
-            let fits: Vec<f64> = levels.par_iter().map(|level| fit(&one(*level))).collect();
+            let one = |level| best.looked_at(|i, own| if i == which { level } else { own }, roles);
+            let levels: Vec<Level> = hypotheses(&best.loose()[which]).chain([own]).collect();
+            // A metric needs much memory. Therefore those of the levels are not kept.
+            let first = levels.par_iter().map(|level| {
+                let metric = one(*level);
+                (metric.spectral_level(roles, residual), metric.beside(roles, residual, 1.0))
+            });
+            let first: Vec<(f64, f64)> = first.collect();
+            let noise = first.iter().map(|(level, _)| *level).fold(f64::INFINITY, f64::min);
+            let noise = noise.max(1.0).sqrt();
+            let fit = |level: &Level| one(*level).beside(roles, residual, noise);
+            let fits: Vec<f64> = match noise == 1.0 {
+                true => first.into_iter().map(|(_, fit)| fit).collect(),
+                false => levels.par_iter().map(fit).collect(),
+            };
             let before = fits.last().copied().unwrap_or(0.0);
-            let all = fits.iter().copied().zip(&levels);
-            let Some((most, level)) = all.max_by(|a, b| a.0.total_cmp(&b.0)) else { continue };
+            let best_of = |fits: Vec<f64>, levels: &[Level]| {
+                let all = fits.into_iter().zip(levels.to_vec());
+                all.max_by(|a, b| a.0.total_cmp(&b.0))
+            };
+            let Some((mut most, mut level)) = best_of(fits, &levels) else { continue };
+            let beyond: Vec<Level> = beyond(&best.loose()[which]).collect();
+            if SIZES.last() == Some(&level.size)
+                && let Some(other) = best_of(beyond.par_iter().map(fit).collect(), &beyond)
+                && other.0 > most
+            {
+                (most, level) = other;
+            }
             let is_recorder = best.loose()[which].parameter.is_none();
             let usual = if is_recorder { Level::NONE } else { own };
+            let set = |level| best.with(|i, own| if i == which { level } else { own }, roles);
             let is_of_motion = || {
                 let mut left = residual.to_vec();
                 one(Level::NONE).clean(roles, &mut left);
                 depends_on_motion(&left)
             };
-            if BEYOND.contains(&level.size) || (*level != usual && is_of_motion()) {
-                best = one(usual);
+            if BEYOND.contains(&level.size) || (level != usual && is_of_motion()) {
+                best = set(usual);
             } else {
                 gained += most - before;
-                best = one(*level);
+                best = set(level);
             }
         }
         (best, gained)
@@ -101,7 +117,7 @@ impl Metric {
                 return 0.0;
             }
             let fit = |&level: &Level| {
-                let at = self.with(|i, own| if i == which { level } else { own }, roles);
+                let at = self.looked_at(|i, own| if i == which { level } else { own }, roles);
                 at.likelihood_beside(roles, residual, noise) - own - cost(loose, level)
             };
             let fits: Vec<f64> = levels.par_iter().map(fit).collect();
@@ -125,7 +141,7 @@ impl Metric {
         }
         let smaller = |_, level: Level| Level { size: level.size / noise, ..level };
         let scaled: Vec<f64> = residual.iter().map(|r| r / noise).collect();
-        self.with(smaller, roles).likelihood(roles, &scaled)
+        self.looked_at(smaller, roles).likelihood(roles, &scaled)
     }
 
     /// Returns -(r'V^-1 r + ln det V)/2 over the samples that are not test samples.

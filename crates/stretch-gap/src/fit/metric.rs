@@ -1,7 +1,7 @@
 //! The metric of one stage: the covariance by which residuals are weighed. Residuals are in
 //! multiples of the noise, and nuisances (slow drift and offsets) are marginalised.
 //!
-//! Within one segment of the recording, the residual r has the covariance V = I + C P^-1 C' of
+//! Within one segment of the recording, the residual r has the covariance V of
 //! [`nuisance`](crate::fit::nuisance): white noise of variance 1, and the changes that slow drift
 //! and offsets of parameters may cause. Segments are independent, so that the squared Mahalanobis
 //! length of a residual, its chi-square, is
@@ -19,7 +19,7 @@ use std::sync::Arc;
 use crate::{
     fit::{
         noise_level::NoiseLevel,
-        nuisance::{Drifting, Knots, Nuisance, Patch},
+        nuisance::{Nuisance, Part},
     },
     numerics::linear::dot,
     problem::{
@@ -38,6 +38,8 @@ pub(crate) struct Metric {
     pub(crate) noise: NoiseLevel,
     /// Parameters of the stage that drift or are offset in each trial.
     loose: Vec<Loose>,
+    /// Sample time, s.
+    dt_s: f64,
     /// The nuisance of each segment; `None` if no parameter of the stage is loose.
     nuisances: Vec<Option<Nuisance>>,
 }
@@ -60,14 +62,6 @@ pub(crate) struct Loose {
     pub(crate) is_by_tick: bool,
     /// Assumed size and correlation time of the drift or offset.
     pub(crate) level: Level,
-    /// Knots of the drift by segment; none for an offset.
-    knots: Arc<[Arc<Knots>]>,
-}
-
-/// Returns the knots of a drift in each segment. `clock` holds, for every sample, the index of the last sample so far
-/// at which the drift could reach the output (a drift of the supply, for example, only while the inlet is open).
-fn knots_of(clock: &[u32], roles: &SampleRoles, dt_s: f64) -> Arc<[Arc<Knots>]> {
-    roles.segments.iter().map(|s| Arc::new(Knots::of(&clock[s.from..s.to], dt_s))).collect()
 }
 
 /// Size of a nuisance, as a multiple of the size in the simulator's description (0 for no
@@ -88,8 +82,9 @@ impl Level {
 #[derive(Debug, Clone)]
 pub(crate) struct Column {
     pub(crate) values: Vec<f64>,
-    /// L^-1 C'x by segment, with L and C of [`nuisance`](crate::fit::nuisance).
-    tails: Vec<Vec<f64>>,
+    /// By segment: the values whitened by [`nuisance`](crate::fit::nuisance); `None` without a
+    /// nuisance.
+    whitened: Vec<Option<Vec<f64>>>,
 }
 
 impl Metric {
@@ -113,7 +108,8 @@ impl Metric {
         let is_loose = |p: &usize| sd(*p).is_some();
         let own = simulator.stages()[stage].parameters.iter().copied();
         let parameters: Vec<usize> = own.filter(is_loose).collect();
-        let mut metric = Self { noise, loose: Vec::new(), nuisances: Vec::new() };
+        let dt_s = simulator.dt_s();
+        let mut metric = Self { noise, loose: Vec::new(), dt_s, nuisances: Vec::new() };
         let trials = simulator.trials();
         let always = || trials.iter().flat_map(|t| 0..t.samples as u32).collect::<Vec<u32>>();
         // The recorder comes first, so that its index does not depend on the parameters.
@@ -121,10 +117,9 @@ impl Metric {
             let column =
                 metric.noise.sd.iter().map(|sd| if sd.is_finite() { drift.sd } else { 0.0 });
             let (column, clock) = (column.collect(), always());
-            let knots = knots_of(&clock, roles, simulator.dt_s());
             let (parameter, clock, drift) = (None, clock.into(), Some(drift));
             let (level, is_by_tick) = (Level::NONE, false);
-            metric.loose.push(Loose { parameter, column, clock, drift, is_by_tick, level, knots });
+            metric.loose.push(Loose { parameter, column, clock, drift, is_by_tick, level });
         }
         let plain = match parameters.is_empty() {
             true => Vec::new(),
@@ -139,51 +134,54 @@ impl Metric {
                 *x = (*x - y) / sd;
             }
             let clock = simulator.record().drift_clock(p).map_or_else(always, <[u32]>::to_vec);
-            let knots = match spec.drift {
-                Some(_) => knots_of(&clock, roles, simulator.dt_s()),
-                None => Arc::default(),
-            };
             let level = Level { size: 1.0, time_s: spec.drift.map_or(1.0, |w| w.correlation_s) };
             let is_by_tick = spec.per_tick_sd.is_some();
             let (column, clock) = (column.into(), clock.into());
             let drift = spec.drift;
             let parameter = Some(p);
-            metric.loose.push(Loose { parameter, column, clock, drift, is_by_tick, level, knots });
+            metric.loose.push(Loose { parameter, column, clock, drift, is_by_tick, level });
         }
         if let Some(like) = like {
             let pairs = metric.loose.iter_mut().zip(&like.loose);
             pairs.for_each(|(own, other)| own.level = other.level);
         }
-        metric.marginalise(roles);
+        metric.marginalise(roles, |_| true);
         Ok(metric)
     }
 
     /// Recomputes the nuisances of all segments from the levels of the loose parameters.
-    fn marginalise(&mut self, roles: &SampleRoles) {
-        let one = |(at, segment): (usize, &Segment)| {
+    fn marginalise(&mut self, roles: &SampleRoles, is_used: impl Fn(&Segment) -> bool) {
+        let loose = || self.loose.iter().filter(|loose| loose.level.size > 0.0);
+        let one = |segment: &Segment| {
             let range = segment.from..segment.to;
-            let (mut offsets, mut drifting) = (Vec::new(), Vec::new());
-            for loose in self.loose.iter().filter(|loose| loose.level.size > 0.0) {
-                let Level { size, time_s } = loose.level;
-                let part: Vec<f64> = loose.column[range.clone()].iter().map(|x| size * x).collect();
-                let clock = &loose.clock[range.clone()];
-                if loose.is_by_tick {
-                    let mut from = 0;
-                    for tick in clock.chunk_by(|a, b| a == b) {
-                        let values = part[from..from + tick.len()].to_vec();
-                        offsets.push(Patch { from, values });
-                        from += tick.len();
-                    }
-                } else if loose.drift.is_some() {
-                    drifting.push(Drifting::new(part, Arc::clone(&loose.knots[at]), time_s));
-                } else {
-                    offsets.push(Patch { from: 0, values: part });
-                }
+            if !is_used(segment) {
+                return None;
             }
-            let is_any = !(offsets.is_empty() && drifting.is_empty());
-            is_any.then(|| Nuisance::new(offsets, drifting))
+            let part = |loose: &Loose| {
+                let Level { size, time_s } = loose.level;
+                let clock = &loose.clock[range.clone()];
+                let kept = |passed: u32| match (loose.drift, loose.is_by_tick) {
+                    (_, true) => f64::from(passed == 0),
+                    (Some(_), _) => (-self.dt_s * f64::from(passed) / time_s).exp(),
+                    (None, _) => 1.0,
+                };
+                // Most steps of a clock are equally long, and exponentials take long.
+                let (mut last, mut share) = (0, kept(0));
+                let before = clock.first().into_iter().chain(clock);
+                let passed = clock.iter().zip(before).map(|(now, before)| now - before);
+                let kept = passed.map(|passed| {
+                    if passed != last {
+                        (last, share) = (passed, kept(passed));
+                    }
+                    share
+                });
+                let column = loose.column[range.clone()].iter().map(|x| size * x).collect();
+                Part { column, kept: kept.collect() }
+            };
+            let parts: Vec<Part> = loose().map(part).collect();
+            (!parts.is_empty()).then(|| Nuisance::new(&parts))
         };
-        self.nuisances = roles.segments.iter().enumerate().map(one).collect();
+        self.nuisances = roles.segments.iter().map(one).collect();
     }
 
     /// Parameters of the stage that drift or are offset in each trial.
@@ -198,35 +196,40 @@ impl Metric {
         Some((own.drift?.sd * own.level.size, own.level.time_s))
     }
 
-    /// The nuisance of each segment.
-    pub(super) fn nuisances(&self) -> &[Option<Nuisance>] {
-        &self.nuisances
-    }
-
     /// Returns the metric with another level for every loose parameter.
     pub(crate) fn with(&self, level: impl Fn(usize, Level) -> Level, roles: &SampleRoles) -> Self {
+        let mut other = self.leveled(level);
+        other.marginalise(roles, |_| true);
+        other
+    }
+
+    /// Like [`Metric::with`], but for the samples that are not test samples only.
+    pub(crate) fn looked_at(
+        &self,
+        level: impl Fn(usize, Level) -> Level,
+        roles: &SampleRoles,
+    ) -> Self {
+        let mut other = self.leveled(level);
+        other.marginalise(roles, |segment| segment.role != Role::Test);
+        other
+    }
+
+    fn leveled(&self, level: impl Fn(usize, Level) -> Level) -> Self {
         let (noise, loose) = (self.noise.clone(), self.loose.clone());
-        let mut other = Self { noise, loose, nuisances: Vec::new() };
+        let mut other = Self { noise, loose, dt_s: self.dt_s, nuisances: Vec::new() };
         let each = other.loose.iter_mut().enumerate();
         each.for_each(|(i, loose)| loose.level = level(i, loose.level));
-        other.marginalise(roles);
         other
     }
 
     /// Returns a column of values, in multiples of the noise, that cover the first trials.
     pub(crate) fn column(&self, roles: &SampleRoles, values: Vec<f64>) -> Column {
-        let tails = roles
-            .segments
-            .iter()
-            .zip(&self.nuisances)
-            .map(|(segment, nuisance)| match nuisance {
-                Some(nuisance) if segment.to <= values.len() => {
-                    nuisance.tail(&values[segment.from..segment.to])
-                }
-                _ => Vec::new(),
-            })
-            .collect();
-        Column { values, tails }
+        let one = |(segment, nuisance): (&Segment, &Option<Nuisance>)| {
+            let nuisance = nuisance.as_ref().filter(|_| segment.to <= values.len())?;
+            Some(nuisance.whitened(&values[segment.from..segment.to]))
+        };
+        let whitened = roles.segments.iter().zip(&self.nuisances).map(one).collect();
+        Column { values, whitened }
     }
 
     /// Returns x'V^-1 y over the segments in a role.
@@ -237,8 +240,10 @@ impl Metric {
                 continue;
             }
             let range = segment.from..segment.to;
-            sum += dot(&x.values[range.clone()], &y.values[range]);
-            sum -= dot(&x.tails[i], &y.tails[i]);
+            sum += match (&x.whitened[i], &y.whitened[i]) {
+                (Some(x), Some(y)) => dot(x, y),
+                _ => dot(&x.values[range.clone()], &y.values[range]),
+            };
         }
         sum
     }
@@ -287,13 +292,11 @@ impl Metric {
         let clock: Arc<[u32]> = (0..column.len() as u32).collect();
         let column = column.into();
         let level = Level { size: 1.0, time_s: drift.correlation_s };
-        let knots = knots_of(&clock, roles, dt_s);
         let drift = Some(drift);
         let is_by_tick = false;
-        let loose =
-            vec![Loose { parameter: Some(0), column, clock, drift, is_by_tick, level, knots }];
-        let mut metric = Self { noise, loose, nuisances: Vec::new() };
-        metric.marginalise(roles);
+        let loose = vec![Loose { parameter: Some(0), column, clock, drift, is_by_tick, level }];
+        let mut metric = Self { noise, loose, dt_s, nuisances: Vec::new() };
+        metric.marginalise(roles, |_| true);
         metric
     }
 }

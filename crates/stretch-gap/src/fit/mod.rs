@@ -9,9 +9,9 @@
 //! residuals and sensitivities of the stages ([`comparison`]); bounded Levenberg-Marquardt fits in
 //! scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced chi-square and scores ([`score`],
 //! [`octaves`]); errors that several outputs have in common ([`alike`]); deviations of the forms of
-//! effects ([`deviations`]); which parameters the data determine ([`identifiability`]); whether a
-//! drift oscillates ([`swing`]); re-tuning from several starts ([`starts`]); a fit of selected
-//! samples after a diagnosis ([`sample_fit`]). Uses the modules `numerics` and `problem`.
+//! effects ([`deviations`]); which parameters the data determine ([`identifiability`]);
+//! re-tuning from several starts ([`starts`]); a fit of selected samples after a diagnosis
+//! ([`sample_fit`]). Uses the modules `numerics` and `problem`.
 
 pub(crate) mod alike;
 pub(crate) mod comparison;
@@ -31,7 +31,6 @@ pub(crate) mod prepared;
 pub(crate) mod sample_fit;
 pub(crate) mod score;
 pub(crate) mod starts;
-pub(crate) mod swing;
 
 #[cfg(test)]
 pub(crate) mod tests;

@@ -1,298 +1,260 @@
-//! Marginalises the nuisances (slow drift and trial offsets of parameters) out of the residual in
-//! one segment of samples.
+//! Marginalises the nuisances (slow drift and trial offsets of parameters, slow noise of the
+//! recorder) out of the residual in one segment of samples.
 //!
-//! A column of C is the change of the output by a nuisance of unit amplitude, in multiples of the
-//! noise. With amplitudes b of prior precision P and white noise of variance 1, a residual r has
-//! the covariance V = I + C P^-1 C'. By the matrix inversion lemma
+//! Every nuisance j has an amplitude b_j of variance 1, which changes sample i of the output by
+//! h_ij, in multiples of the noise. From one sample to the next, the amplitude keeps the share f_ij
+//! of its value: 1 for an offset, and less for a drift. The residual x of a sample, with the row h
+//! of its nuisances, is predicted by a Kalman filter whose noise has the variance 1:
 //!
 //! ```text
-//! x' V^-1 y = x'y - (L^-1 C'x)' (L^-1 C'y),     L L' = C'C + P
+//! a <- F (a + k e),     P <- F (P - k h'P) F + I - F F,     F = diag(f)
+//! e = x - h'a,     s = 1 + h'P h,     k = P h/s
 //! ```
 //!
-//! (Rasmussen and Williams 2006, appendix A.3). Therefore a product of two columns x and y needs
-//! one projection and one triangular solve for each of them, but no matrix as large as the
-//! recording. A residual is cleaned by subtracting C b with the most likely amplitudes b = (C'C +
-//! P)^-1 C'r.
+//! The prediction errors e are independent and have the variances s. The covariance V of all
+//! samples therefore gives
+//!
+//! ```text
+//! x' V^-1 y = sum over samples of e_x e_y/s,     ln det V = sum over samples of ln s
+//! ```
+//!
+//! (Durbin and Koopman 2012, sections 4.3 and 7.2), and no matrix as large as the recording is
+//! needed. A residual without its most likely nuisances is V^-1 x, because the noise has the
+//! variance 1.
 
-use std::{ops::Range, sync::Arc};
+/// A nuisance in one segment.
+#[derive(Debug, Clone)]
+pub(super) struct Part {
+    /// Change of each sample if the amplitude is 1.
+    pub(super) column: Vec<f64>,
+    /// By sample: share of the amplitude that is kept from the sample before.
+    pub(super) kept: Vec<f64>,
+}
 
-use crate::numerics::{
-    arrowhead::{Arrow, ArrowFactor},
-    linear::dot,
-};
-
-/// Distance of the knots, s. Drift is a rough process (Ornstein-Uhlenbeck). Straight lines between
-/// knots that are farther apart would make a fast drift look even faster.
-const KNOT_S: f64 = 0.1;
-
-/// Nuisances of one segment of one stage.
+/// Nuisances of one segment of one stage. Each list holds all nuisances of a sample next to each
+/// other.
 #[derive(Debug, Clone)]
 pub(super) struct Nuisance {
-    /// Columns of offsets; their amplitudes have prior precision 1.
-    offsets: Vec<Patch>,
-    /// Columns of parameters that drift.
-    drifting: Vec<Drifting>,
-    /// L of the module documentation.
-    factor: ArrowFactor,
+    count: usize,
+    /// h of the module documentation.
+    columns: Vec<f64>,
+    /// f of the module documentation.
+    kept: Vec<f64>,
+    /// k of the module documentation.
+    gains: Vec<f64>,
+    /// By sample: 1/sqrt(s).
+    weights: Vec<f64>,
     ln_determinant: f64,
 }
 
-/// Sensitivity to an offset, from the sample `from` to the end of the offset.
-#[derive(Debug, Clone)]
-pub(super) struct Patch {
-    pub(super) from: usize,
-    pub(super) values: Vec<f64>,
-}
-
-impl Patch {
-    fn dot(&self, x: &[f64]) -> f64 {
-        dot(&self.values, &x[self.from..self.from + self.values.len()])
-    }
-
-    /// Returns the product with another patch over the samples that both contain.
-    fn overlap(&self, other: &Self) -> f64 {
-        let from = self.from.max(other.from);
-        let to = (self.from + self.values.len()).min(other.from + other.values.len());
-        if from >= to {
-            return 0.0;
+/// Calls a function with the number of nuisances. Loops over a number that the compiler knows take
+/// half the time, and few stages have more than three nuisances.
+macro_rules! with_count {
+    ($count:expr, $call:expr) => {
+        match $count {
+            1 => $call(1),
+            2 => $call(2),
+            3 => $call(3),
+            count => $call(count),
         }
-        dot(
-            &self.values[from - self.from..to - self.from],
-            &other.values[from - other.from..to - other.from],
-        )
-    }
+    };
 }
 
-/// Sensitivity to a drifting parameter, and the two knots between which each sample lies.
-///
-/// The drift is linear between knots. If sample i lies between knots k and k + 1, at the share w of
-/// the way, it changes by s_i ((1 - w) b_k + w b_(k+1)). The position between knots is computed
-/// from the clock of the sample: the last time at which the drift could reach the output.
-#[derive(Debug, Clone)]
-pub(super) struct Drifting {
-    sensitivity: Vec<f64>,
-    /// Knots of the segment, which may extend beyond the samples.
-    knots: Arc<Knots>,
-    /// Correlation of neighbouring knots, exp(-distance/correlation time).
-    kept: f64,
-}
-
-/// The knots of a drift in one segment.
-#[derive(Debug)]
-pub(super) struct Knots {
-    /// By sample: index of the knot before it, and the share of the way to the next knot.
-    place: Vec<(u32, f64)>,
-    count: usize,
-    /// Time between two knots, s.
-    step_s: f64,
-}
-
-impl Knots {
-    /// Computes the knots for a clock that counts samples; `dt_s` is the sample time.
-    pub(super) fn of(clock: &[u32], dt_s: f64) -> Self {
-        let knot = ((KNOT_S / dt_s) as usize).max(1);
-        let first = clock.first().copied().unwrap_or(0);
-        let place: Vec<(u32, f64)> = clock
-            .iter()
-            .map(|c| {
-                let at = c.saturating_sub(first) as usize;
-                ((at / knot) as u32, (at % knot) as f64 / knot as f64)
-            })
-            .collect();
-        let count = place.iter().map(|p| p.0 as usize).max().unwrap_or(0) + 2;
-        Self { place, count, step_s: knot as f64 * dt_s }
-    }
-}
-
-impl Drifting {
-    /// Creates a drift of variance 1 and correlation time `time_s`.
-    pub(super) fn new(sensitivity: Vec<f64>, knots: Arc<Knots>, time_s: f64) -> Self {
-        let kept = (-knots.step_s / time_s).exp();
-        Self { sensitivity, knots, kept }
-    }
-
-    /// Returns, for each sample: its index, the index of the knot before it, and the weights of
-    /// this knot and the next.
-    fn each(&self) -> impl Iterator<Item = (usize, usize, f64, f64)> {
-        self.within(0..self.sensitivity.len())
-    }
-
-    fn within(&self, samples: Range<usize>) -> impl Iterator<Item = (usize, usize, f64, f64)> {
-        samples.map(|i| {
-            let (s, (k, share)) = (self.sensitivity[i], self.knots.place[i]);
-            (i, k as usize, (1.0 - share) * s, share * s)
-        })
-    }
-}
+/// Product of variances at which its logarithm is taken, long before it overflows.
+const LARGE: f64 = 1e100;
 
 impl Nuisance {
-    pub(super) fn new(offsets: Vec<Patch>, drifting: Vec<Drifting>) -> Self {
-        let factor = precision(&offsets, &drifting).factor();
-        // Each drift has K knots of variance 1, with the correlation rho between neighbours. Its ln
-        // det P is -(K - 1) ln(1 - rho^2).
-        let prior = |w: &Drifting| -(w.knots.count as f64 - 1.0) * (1.0 - w.kept * w.kept).ln();
-        let prior: f64 = drifting.iter().map(prior).sum();
-        let ln_determinant = factor.ln_determinant() - prior;
-        Self { offsets, drifting, factor, ln_determinant }
+    /// Creates the nuisances of a segment; `parts` holds at least one.
+    pub(super) fn new(parts: &[Part]) -> Self {
+        let (count, samples) = (parts.len(), parts[0].column.len());
+        let mut own = Self {
+            count,
+            columns: vec![0.0; samples * count],
+            kept: vec![0.0; samples * count],
+            gains: vec![0.0; samples * count],
+            weights: Vec::with_capacity(samples),
+            ln_determinant: 0.0,
+        };
+        for (j, part) in parts.iter().enumerate() {
+            let to = |all: &mut Vec<f64>, from: &[f64]| {
+                let places = all[j..].iter_mut().step_by(count);
+                places.zip(from).for_each(|(to, from)| *to = *from);
+            };
+            to(&mut own.columns, &part.column);
+            to(&mut own.kept, &part.kept);
+        }
+        with_count!(count, |m| own.filter(m));
+        own
     }
 
-    /// Returns ln det V = ln det(C'C + P) - ln det P.
+    /// Computes the gains, the weights and the determinant.
+    #[inline(always)]
+    fn filter(&mut self, m: usize) {
+        let mut p: Vec<f64> = (0..m * m).map(|at| f64::from(at / m == at % m)).collect();
+        let mut determinant = 1.0_f64;
+        for at in (0..self.columns.len()).step_by(m) {
+            let (h, f) = (&self.columns[at..at + m], &self.kept[at..at + m]);
+            let (k, p) = (&mut self.gains[at..at + m], &mut p[..m * m]);
+            let mut variance = 1.0;
+            for i in 0..m {
+                k[i] = 0.0;
+                for j in 0..m {
+                    p[i * m + j] *= f[i] * f[j];
+                    p[i * m + j] += if i == j { 1.0 - f[i] * f[i] } else { 0.0 };
+                    k[i] += p[i * m + j] * h[j];
+                }
+                variance += k[i] * h[i];
+            }
+            let precision = 1.0 / variance;
+            for i in 0..m {
+                for j in 0..m {
+                    p[i * m + j] -= precision * k[i] * k[j];
+                }
+            }
+            k.iter_mut().for_each(|k| *k *= precision);
+            self.weights.push(precision.sqrt());
+            determinant *= variance;
+            if determinant > LARGE {
+                self.ln_determinant += determinant.ln();
+                determinant = 1.0;
+            }
+        }
+        self.ln_determinant += determinant.ln();
+    }
+
+    /// Returns ln det V.
     pub(super) fn ln_determinant(&self) -> f64 {
         self.ln_determinant
     }
 
-    /// Returns L^-1 C'x. The scalar product of two of these vectors is the part of a product of
-    /// columns that the nuisances explain.
-    pub(super) fn tail(&self, x: &[f64]) -> Vec<f64> {
-        let mut tail = project(&self.offsets, &self.drifting, x);
-        self.factor.forward(&mut tail);
-        tail
+    /// Returns the prediction errors of a residual in multiples of their standard deviations,
+    /// e/sqrt(s): the scalar product of two of these vectors is x'V^-1 y.
+    pub(super) fn whitened(&self, x: &[f64]) -> Vec<f64> {
+        with_count!(self.count, |m| self.errors(m, x))
     }
 
-    /// Returns the time between knots, s, and C'x at the knots of the drift with the index `which`.
-    pub(super) fn at_knots(&self, which: usize, x: &[f64]) -> (f64, Vec<f64>) {
-        let drifting = &self.drifting[which];
-        (drifting.knots.step_s, project(&[], std::slice::from_ref(drifting), x))
+    #[inline(always)]
+    fn errors(&self, m: usize, x: &[f64]) -> Vec<f64> {
+        let mut amplitudes = vec![0.0; m];
+        let mut errors = x.to_vec();
+        for (sample, error) in errors.iter_mut().enumerate() {
+            let (h, f, k) = self.row(m, sample);
+            let a = &mut amplitudes[..m];
+            for j in 0..m {
+                a[j] *= f[j];
+                *error -= h[j] * a[j];
+            }
+            for j in 0..m {
+                a[j] += k[j] * *error;
+            }
+            *error *= self.weights[sample];
+        }
+        errors
     }
 
-    /// Returns C b: the change of the samples by the drift with the index `which` if it has the
-    /// values `knots` at its knots.
-    pub(super) fn course(&self, which: usize, knots: &[f64]) -> Vec<f64> {
-        let each = self.drifting[which].each();
-        each.map(|(_, k, this, next)| this * knots[k] + next * knots[k + 1]).collect()
-    }
-
-    /// Subtracts the most likely nuisance from a residual.
+    /// Subtracts the most likely nuisances from a residual, which gives V^-1 x.
     pub(super) fn clean(&self, x: &mut [f64]) {
-        let mut b = project(&self.offsets, &self.drifting, x);
-        self.factor.solve(&mut b);
-        let mut base = 0;
-        for drifting in &self.drifting {
-            for (i, k, this, next) in drifting.each() {
-                x[i] -= this * b[base + k] + next * b[base + k + 1];
-            }
-            base += drifting.knots.count;
-        }
-        for (offset, b) in self.offsets.iter().zip(&b[base..]) {
-            x[offset.from..].iter_mut().zip(&offset.values).for_each(|(x, d)| *x -= b * d);
-        }
+        with_count!(self.count, |m| self.clean_of(m, x));
     }
-}
 
-/// Returns C'x: first for the knots of all drifts, then for the offsets.
-fn project(offsets: &[Patch], drifting: &[Drifting], x: &[f64]) -> Vec<f64> {
-    let mut out = Vec::new();
-    for drifting in drifting {
-        let base = out.len();
-        out.resize(base + drifting.knots.count, 0.0);
-        for (i, k, this, next) in drifting.each() {
-            out[base + k] += this * x[i];
-            out[base + k + 1] += next * x[i];
+    /// V^-1 x is the derivative of x'V^-1 x/2 by x. It is propagated backwards through the filter.
+    #[inline(always)]
+    fn clean_of(&self, m: usize, x: &mut [f64]) {
+        let whitened = self.errors(m, x);
+        let mut later = vec![0.0; m];
+        for (sample, x) in x.iter_mut().enumerate().rev() {
+            let (h, f, k) = self.row(m, sample);
+            let later = &mut later[..m];
+            *x = whitened[sample] * self.weights[sample];
+            for j in 0..m {
+                *x += k[j] * later[j];
+            }
+            for j in 0..m {
+                later[j] = f[j] * (later[j] - h[j] * *x);
+            }
         }
     }
-    out.extend(offsets.iter().map(|d| d.dot(x)));
-    out
-}
 
-/// Returns the posterior precision C'C + P. The columns of different drifts of one stage are
-/// assumed to be orthogonal.
-fn precision(offsets: &[Patch], drifting: &[Drifting]) -> Arrow {
-    let knots = drifting.iter().map(|w| w.knots.count).sum();
-    let mut a = Arrow::zeros(knots, offsets.len());
-    for (i, column) in offsets.iter().enumerate() {
-        let mut base = 0;
-        for drifting in drifting {
-            let span = column.from..column.from + column.values.len();
-            for (sample, k, this, next) in drifting.within(span) {
-                let x = column.values[sample - column.from];
-                a.border[i][base + k] += this * x;
-                a.border[i][base + k + 1] += next * x;
-            }
-            base += drifting.knots.count;
-        }
-        for (j, other) in offsets.iter().enumerate() {
-            a.corner[i][j] = column.overlap(other);
-        }
-        a.corner[i][i] += 1.0;
+    /// Returns h, f and k of a sample.
+    #[inline(always)]
+    fn row(&self, m: usize, sample: usize) -> (&[f64], &[f64], &[f64]) {
+        let (from, to) = (sample * m, (sample + 1) * m);
+        (&self.columns[from..to], &self.kept[from..to], &self.gains[from..to])
     }
-    let mut base = 0;
-    for drifting in drifting {
-        // Each sample lies between two knots, so the part of C'C that belongs to a drift is
-        // tridiagonal.
-        for (_, k, x, y) in drifting.each() {
-            let k = base + k;
-            a.diagonal[k] += x * x;
-            a.beside[k] += x * y;
-            a.diagonal[k + 1] += y * y;
-        }
-        // P is the inverse covariance of an Ornstein-Uhlenbeck process at evenly spaced knots with
-        // the correlation rho between neighbours. It has (1, 1 + rho^2, ..., 1)/(1 - rho^2) on the
-        // diagonal and -rho/(1 - rho^2) on the two secondary diagonals.
-        let (knots, kept) = (drifting.knots.count, drifting.kept);
-        let scale = 1.0 / (1.0 - kept * kept);
-        for k in 0..knots {
-            let inner = k > 0 && k + 1 < knots;
-            a.diagonal[base + k] += scale * if inner { 1.0 + kept * kept } else { 1.0 };
-            if k + 1 < knots {
-                a.beside[base + k] -= scale * kept;
-            }
-        }
-        base += knots;
-    }
-    a
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::numerics::random::RandomGenerator;
+    use crate::numerics::{linear::dot, random::RandomGenerator};
+    use nalgebra::{DMatrix, DVector};
     use testkit::tolerance::FIT_WELL;
 
     const SAMPLES: usize = 60;
 
-    fn patch(from: usize, samples: usize) -> Patch {
-        Patch { from, values: vec![0.5; samples] }
+    fn part(from: usize, samples: usize, value: f64) -> Part {
+        let is_in = |i: usize| (from..from + samples).contains(&i);
+        let column = (0..SAMPLES).map(|i| if is_in(i) { value } else { 0.0 }).collect();
+        Part { column, kept: vec![1.0; SAMPLES] }
     }
 
-    fn nuisance() -> Nuisance {
-        let clock: Vec<u32> = (0..SAMPLES as u32).collect();
-        let slope: Vec<f64> = (0..SAMPLES).map(|i| 0.1 * i as f64).collect();
-        Nuisance::new(
-            vec![patch(0, SAMPLES)],
-            vec![Drifting::new(slope, Arc::new(Knots::of(&clock, 0.01)), 0.3)],
-        )
+    fn drawn(seed: u64) -> Vec<f64> {
+        let mut random = RandomGenerator::new(seed, 0);
+        (0..SAMPLES).map(|_| random.gauss()).collect()
     }
 
-    /// x'V^-1 y = x'(y - C b) with the most likely b: both sides are computed.
+    /// Returns V = I + sum over nuisances of h h' times the correlation of their amplitudes.
+    fn dense(parts: &[Part]) -> DMatrix<f64> {
+        let kept = |part: &Part, i: usize, j: usize| -> f64 {
+            part.kept[i.min(j) + 1..=i.max(j)].iter().product()
+        };
+        let of = |i: usize, j: usize| {
+            let one = |p: &Part| p.column[i] * p.column[j] * kept(p, i, j);
+            f64::from(u8::from(i == j)) + parts.iter().map(one).sum::<f64>()
+        };
+        DMatrix::from_fn(SAMPLES, SAMPLES, of)
+    }
+
+    /// Two drifts, one of which stands still for a while, a separate offset for every ten samples,
+    /// and an offset: products, determinant and cleaned residual are those of the dense covariance.
     #[test]
-    fn the_product_is_that_with_a_cleaned_column() {
-        let mut random = RandomGenerator::new(2, 0);
-        let [x, y] = [0, 1].map(|_| (0..SAMPLES).map(|_| random.gauss()).collect::<Vec<f64>>());
-        let nuisance = nuisance();
-        let product = dot(&x, &y) - dot(&nuisance.tail(&x), &nuisance.tail(&y));
-        let mut cleaned = y.clone();
+    fn overlapping_nuisances_have_the_dense_covariance() {
+        let (first, other) = (drawn(3), drawn(4));
+        let of = |kept: fn(usize) -> f64| (0..SAMPLES).map(kept).collect::<Vec<f64>>();
+        let parts = vec![
+            Part { column: first, kept: of(|_| 0.95) },
+            Part { column: other, kept: of(|i| if (20..40).contains(&i) { 1.0 } else { 0.8 }) },
+            Part { kept: of(|i| if i % 10 == 0 { 0.0 } else { 1.0 }), ..part(0, SAMPLES, 0.7) },
+            part(15, 30, 2.0),
+        ];
+        let factor = dense(&parts).cholesky().expect("definite");
+        let nuisance = Nuisance::new(&parts);
+        let (x, y) = (drawn(1), drawn(2));
+        let solved = factor.solve(&DVector::from_vec(y.clone()));
+        let product = dot(&nuisance.whitened(&x), &nuisance.whitened(&y));
+        let expected = dot(&x, solved.as_slice());
+        approx::assert_relative_eq!(product, expected, max_relative = FIT_WELL, epsilon = FIT_WELL);
+        let expected = 2.0 * factor.l().diagonal().map(f64::ln).sum();
+        approx::assert_relative_eq!(nuisance.ln_determinant(), expected, max_relative = FIT_WELL);
+        let mut cleaned = y;
         nuisance.clean(&mut cleaned);
-        approx::assert_relative_eq!(
-            product,
-            dot(&x, &cleaned),
-            max_relative = FIT_WELL,
-            epsilon = FIT_WELL
-        );
+        approx::assert_abs_diff_eq!(cleaned[..], solved.as_slice()[..], epsilon = FIT_WELL);
     }
 
     /// Two equal offsets at the same samples have together twice the variance of one. Offsets at
     /// different samples are independent.
     #[test]
     fn offsets_share_what_they_explain() {
-        let mut random = RandomGenerator::new(5, 0);
-        let x: Vec<f64> = (0..SAMPLES).map(|_| random.gauss()).collect();
-        let lost = |nuisance: &Nuisance| dot(&nuisance.tail(&x), &nuisance.tail(&x));
-        let both = Nuisance::new(vec![patch(10, 20), patch(10, 20)], Vec::new());
-        let wide = Patch { from: 10, values: vec![0.5 * 2.0_f64.sqrt(); 20] };
-        let single = Nuisance::new(vec![wide], Vec::new());
+        let x = drawn(5);
+        let lost = |nuisance: &Nuisance| {
+            let own = nuisance.whitened(&x);
+            dot(&x, &x) - dot(&own, &own)
+        };
+        let both = Nuisance::new(&[part(10, 20, 0.5), part(10, 20, 0.5)]);
+        let single = Nuisance::new(&[part(10, 20, 0.5 * 2.0_f64.sqrt())]);
         approx::assert_relative_eq!(lost(&both), lost(&single), max_relative = FIT_WELL);
-        let apart = Nuisance::new(vec![patch(10, 20), patch(30, 20)], Vec::new());
-        let [one, other] = [10, 30].map(|from| Nuisance::new(vec![patch(from, 20)], Vec::new()));
+        let apart = Nuisance::new(&[part(10, 20, 0.5), part(30, 20, 0.5)]);
+        let [one, other] = [10, 30].map(|from| Nuisance::new(&[part(from, 20, 0.5)]));
         approx::assert_relative_eq!(
             lost(&apart),
             lost(&one) + lost(&other),
@@ -304,12 +266,12 @@ mod tests {
     /// n/4) if all elements of c are 1/2.
     #[test]
     fn an_offset_is_taken_out_as_far_as_its_prior_says() {
-        let nuisance = Nuisance::new(vec![patch(0, SAMPLES)], Vec::new());
-        let (ones, n) = (vec![1.0; SAMPLES], SAMPLES as f64);
-        let tail = nuisance.tail(&ones);
+        let nuisance = Nuisance::new(&[part(0, SAMPLES, 0.5)]);
+        let n = SAMPLES as f64;
+        let ones = nuisance.whitened(&[1.0; SAMPLES]);
         let expected = n - (0.5 * n).powi(2) / (1.0 + 0.25 * n);
         // The tolerance is for a difference of numbers as large as n.
-        approx::assert_abs_diff_eq!(n - dot(&tail, &tail), expected, epsilon = FIT_WELL * n);
+        approx::assert_abs_diff_eq!(dot(&ones, &ones), expected, epsilon = FIT_WELL * n);
         let ln_determinant = (1.0 + 0.25 * n).ln();
         approx::assert_abs_diff_eq!(
             nuisance.ln_determinant(),

@@ -1,10 +1,9 @@
 //! Arithmetic that is independent of simulators.
 //!
-//! Input: numbers. Output: factors of normal matrices and least squares within a box ([`linear`],
-//! [`arrowhead`]), seeded random numbers ([`random`]) and elapsed seconds ([`stopwatch`]). This
-//! module imports no other module of the crate.
+//! Input: numbers. Output: factors of normal matrices and least squares within a box ([`linear`]),
+//! seeded random numbers ([`random`]) and elapsed seconds ([`stopwatch`]). This module imports no
+//! other module of the crate.
 
-pub(crate) mod arrowhead;
 pub(crate) mod linear;
 pub(crate) mod random;
 pub(crate) mod stopwatch;

@@ -4,7 +4,6 @@ use nalgebra::{DMatrix, DVector};
 use proptest::{prelude::*, test_runner::RngSeed};
 
 use crate::numerics::{
-    arrowhead::Arrow,
     linear::{Cholesky, boxed},
     random::RandomGenerator,
 };
@@ -68,48 +67,6 @@ proptest! {
                 || slope[i].abs() < SOLVED;
             prop_assert!(is_met, "{i}: {} in {}..{}, slope {}", x[i], low[i], high[i], slope[i]);
         }
-    }
-
-    /// The matrix may have any number of knots and border columns, including none of either.
-    #[test]
-    fn an_arrow_solves_as_its_dense_matrix_does(knots in 0_usize..12, columns in 0_usize..4, seed: u64) {
-        prop_assume!(knots + columns > 0);
-        let n = knots + columns;
-        let mut random = RandomGenerator::new(seed, 4);
-        let mut arrow = Arrow::zeros(knots, columns);
-        arrow.beside.iter_mut().for_each(|x| *x = random.unit() - 0.5);
-        arrow.border.iter_mut().flatten().for_each(|x| *x = 0.5 * (random.unit() - 0.5));
-        // Diagonally dominant in every row, therefore definite.
-        arrow.diagonal.iter_mut().for_each(|x| *x = 2.0 + random.unit());
-        for i in 0..columns {
-            for j in 0..columns {
-                let apart = if i == j { 4.0 + 0.25 * knots as f64 } else { 0.3 };
-                arrow.corner[i][j] = apart;
-            }
-        }
-        let dense = DMatrix::from_fn(n, n, |i, j| {
-            let (low, high) = (i.min(j), i.max(j));
-            match (low < knots, high < knots) {
-                (true, true) if low == high => arrow.diagonal[low],
-                (true, true) if low + 1 == high => arrow.beside[low],
-                (true, true) => 0.0,
-                (true, false) => arrow.border[high - knots][low],
-                _ => arrow.corner[low - knots][high - knots],
-            }
-        });
-        let b = vector(n, seed);
-        let factor = arrow.factor();
-        let mut x = b.as_slice().to_vec();
-        factor.solve(&mut x);
-        let exact = dense.lu();
-        let expected = exact.solve(&b).expect("definite");
-        approx::assert_abs_diff_eq!(x[..], expected.as_slice()[..], epsilon = SOLVED);
-        approx::assert_abs_diff_eq!(factor.ln_determinant(), exact.determinant().ln(), epsilon = SOLVED);
-        // |L^-1 b|^2 = b'A^-1 b
-        let mut half = b.as_slice().to_vec();
-        factor.forward(&mut half);
-        let square: f64 = half.iter().map(|x| x * x).sum();
-        approx::assert_abs_diff_eq!(square, b.dot(&expected), epsilon = SOLVED);
     }
 }
 

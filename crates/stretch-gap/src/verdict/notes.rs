@@ -14,7 +14,6 @@ use crate::{
         identifiability::{Identified, Knowledge},
         metric::Metric,
         prepared::PreparedProblem,
-        swing::Swing,
     },
     problem::{
         record_facts::nouns,
@@ -171,37 +170,6 @@ pub(crate) fn implausible_noise_notes(
         )
     };
     sanity.implausible.iter().map(note).collect()
-}
-
-/// Probability above which an oscillation is noted.
-const SWINGS: f64 = 0.95;
-
-/// Returns a note for each parameter of each stage that oscillates instead of drifting.
-///
-/// An oscillation of a supply is not a modelling error, and the verdict counts it as drift. A user
-/// should know of the oscillation nevertheless.
-pub(crate) fn swing_notes(problem: &PreparedProblem<'_>, evidence: &Evidence) -> Vec<String> {
-    let simulator = problem.simulator();
-    let stages = problem.compare.metrics.iter().zip(&evidence.stages).zip(simulator.stages());
-    let note = |swing: &Swing, stage: &str| {
-        let spec = &simulator.parameters()[swing.parameter];
-        let size = match spec.nominal {
-            0.0 => format!("{:.2e} {}", swing.amplitude, spec.unit),
-            nominal => format!("{:.2} %", 100.0 * (swing.amplitude / nominal).abs()),
-        };
-        format!(
-            "{} oscillates at {:.2} Hz by {size} to either side, according to stage {stage} with a probability of {:.2}: \
-             the diagnosis counts it as drift, and no effect is blamed for it",
-            spec.name, swing.hertz, swing.probability
-        )
-    };
-    stages
-        .flat_map(|((metric, traces), stage)| {
-            let swings = metric.swings(&evidence.roles, &traces.residual_after);
-            let told = swings.into_iter().filter(|swing| swing.probability > SWINGS);
-            told.map(|swing| note(&swing, &stage.name)).collect::<Vec<_>>()
-        })
-        .collect()
 }
 
 /// Returns a note for each output to which the recorder seems to add slow noise.

@@ -32,6 +32,7 @@ pub(super) struct Noises {
     pub(super) pressure_kpa: Noise,
     pub(super) length_drift: SlowDrift,
     pub(super) volts_drift: SlowDrift,
+    pub(super) pressure_drift: SlowDrift,
 }
 
 impl Noises {
@@ -57,14 +58,17 @@ impl Noises {
         };
         let of_length = with_step(Key::SigmaL, Key::Travel);
         let of_volts = with_step(Key::SigmaV, Key::VFs);
+        let of_pressure = 1e-3 * params[Key::SigmaP];
         let length_mm = of(of_length, LENGTH);
         let volts = of(of_volts, VOLTAGE);
+        let pressure_kpa = of(of_pressure, PRESSURE);
         Self {
             length_drift: drift(of_length, &length_mm),
             volts_drift: drift(of_volts, &volts),
+            pressure_drift: drift(of_pressure, &pressure_kpa),
             length_mm,
             volts,
-            pressure_kpa: of(1e-3 * params[Key::SigmaP], PRESSURE),
+            pressure_kpa,
         }
     }
 }

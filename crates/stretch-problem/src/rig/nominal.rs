@@ -97,9 +97,11 @@ pub(super) fn stages(
 ) -> Vec<StageSpec> {
     let stage = |kind: &RigStage| {
         let (channel, unit, noise, drift) = match kind {
-            RigStage::Pneumatics => ("pressure_kpa", "kPa", &noises.pressure_kpa, None),
-            RigStage::Sensing => ("bridge_v", "V", &noises.volts, Some(noises.volts_drift)),
-            _ => ("length_mm", "mm", &noises.length_mm, Some(noises.length_drift)),
+            RigStage::Pneumatics => {
+                ("pressure_kpa", "kPa", &noises.pressure_kpa, noises.pressure_drift)
+            }
+            RigStage::Sensing => ("bridge_v", "V", &noises.volts, noises.volts_drift),
+            _ => ("length_mm", "mm", &noises.length_mm, noises.length_drift),
         };
         // The pressure at a trial's start and the timing of commands belong to the chamber.
         let owner = |parameter: &TunedParameter| match parameter {
@@ -107,6 +109,8 @@ pub(super) fn stages(
             TunedParameter::InitialState(stage) => *stage,
             TunedParameter::StartPressure | TunedParameter::CommandLead(_) => RigStage::Pneumatics,
         };
+        // The slow noise of a measured input reaches the output as well.
+        let recorders = if kind.holds(RigStage::Pneumatics) { 1.0_f64 } else { 2.0 };
         StageSpec {
             name: kind.name().into(),
             channel: channel.into(),
@@ -115,8 +119,7 @@ pub(super) fn stages(
                 .filter(|&i| kind.holds(owner(&parameters[i])))
                 .collect(),
             noise: (noise.sd() > 0.0).then(|| noise.clone()),
-            // In a stage on which the supply acts, the drift of the supply also covers slow noise.
-            recorder_drift: drift.filter(|_| !kind.holds(RigStage::Pneumatics)),
+            recorder_drift: Some(SlowDrift { sd: drift.sd * recorders.sqrt(), ..drift }),
         }
     };
     kinds.iter().map(stage).collect()

@@ -11,10 +11,8 @@ use crate::{
 };
 
 /// Relative: a dense Cholesky factor of 250 rows and a condition of up to 1e4, compared with a
-/// factor for a few knots.
+/// filter.
 const DENSE: f64 = 1e-9;
-/// Number of samples between knots of a drift, which are 0.1 s apart.
-const KNOT: usize = 10;
 
 /// Returns a line whose zero drifts with the given standard deviation and correlation time.
 fn drifting(drift: SlowDrift, samples: usize) -> Toy {
@@ -23,22 +21,13 @@ fn drifting(drift: SlowDrift, samples: usize) -> Toy {
     toy
 }
 
-/// Returns V = I + s W K W' s of one trial, with the linear interpolation W between knots, the
-/// covariance K = exp(-|t|/tau) at the knots, and s in units of the noise.
+/// Returns V = I + s K of one trial, with the covariance K = exp(-|t|/tau) of the drift, and s in
+/// units of the noise.
 fn dense(drift: SlowDrift, noise: f64, samples: usize) -> DMatrix<f64> {
-    let knots = (samples - 1) / KNOT + 2;
-    let weights = DMatrix::from_fn(samples, knots, |i, k| {
-        let share = (i % KNOT) as f64 / KNOT as f64;
-        match k as i64 - (i / KNOT) as i64 {
-            0 => 1.0 - share,
-            1 => share,
-            _ => 0.0,
-        }
-    });
-    let kept = (-0.1 / drift.correlation_s).exp();
-    let prior = DMatrix::from_fn(knots, knots, |i, j| kept.powi(i.abs_diff(j) as i32));
+    let kept = (-0.01 / drift.correlation_s).exp();
     let size = (drift.sd / noise).powi(2);
-    DMatrix::identity(samples, samples) + size * &weights * prior * weights.transpose()
+    let prior = DMatrix::from_fn(samples, samples, |i, j| kept.powi(i.abs_diff(j) as i32));
+    DMatrix::identity(samples, samples) + size * prior
 }
 
 #[test]

@@ -96,7 +96,7 @@ pub fn load<'a, T: serde::Deserialize<'a>>(record: &'a [u8]) -> T {
 /// Generates the `main` of a program that replays the trial through a design, once for each model
 /// and its calibration. The samples are converter codes, or volts in `f32`.
 ///
-/// The arguments are `codes, Design, Estimate, |record| design` or
+/// The arguments are `codes, Design, |record| design` or
 /// `volts, Design, |calibration| design`, followed by `"model" from "record"` for each model.
 #[macro_export]
 macro_rules! program {
@@ -108,9 +108,9 @@ macro_rules! program {
             $make, $($model from $record),+
         );
     };
-    (codes, $design:ty, $estimate:ty, $make:expr, $($model:literal from $record:literal),+ $(,)?) => {
+    (codes, $design:ty, $make:expr, $($model:literal from $record:literal),+ $(,)?) => {
         $crate::program!(
-            @ $design, stretch_receptor::code::AdcCode, $estimate,
+            @ $design, stretch_receptor::code::AdcCode, i32,
             |code| code, core::convert::identity,
             $make, $($model from $record),+
         );

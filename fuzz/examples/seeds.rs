@@ -14,7 +14,7 @@ use stretch_core::{Calibration, RateEstimator};
 use stretch_data::{Channel, Trial};
 use stretch_problem::worker::WorkerFrame;
 use stretch_receptor::{
-    code::{CodeCalibration, FixedCalibration, FixedObserver},
+    code::{FixedCalibration, FixedObserver},
     example_calibration, example_diagnosed, example_observer,
 };
 
@@ -118,7 +118,6 @@ fn write() -> Done {
     for (which, bytes) in [
         flat(&FixedCalibration::<11, 2>::new(&poly, &adc)?)?,
         flat(&FixedObserver::new(&observer, &adc)?)?,
-        flat(&CodeCalibration::<f32, 11, 2>::new(&poly, &adc)?)?,
     ]
     .into_iter()
     .enumerate()

@@ -1,10 +1,10 @@
-//! Any calibration, over any converter, in integers and in `f32`: no overflow, whatever codes come.
+//! Any calibration, over any converter, in integers: no overflow, whatever codes come.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
 use stretch_core::Calibration;
 use stretch_fuzz::{adc, code_steps, observer_steps};
-use stretch_receptor::code::{CodeCalibration, Fixed, FixedCalibration, FixedObserver};
+use stretch_receptor::code::{FixedCalibration, FixedObserver};
 
 fuzz_target!(|bytes: &[u8]| {
     let Some((which, bytes)) = bytes.split_first() else { return };
@@ -21,21 +21,13 @@ fuzz_target!(|bytes: &[u8]| {
                 observer_steps(observer, stream);
             }
         }
-        2 => {
-            if let Ok((float, stream)) =
-                postcard::take_from_bytes::<CodeCalibration<f32, 11, 2>>(bytes)
-            {
-                code_steps(Ok::<_, ()>(float), stream);
-            }
-        }
         // converted from calibrations on a computer
         _ => {
             let Ok((calibration, stream)) = postcard::take_from_bytes::<Calibration>(bytes) else {
                 return;
             };
             let Some(adc) = adc(&calibration, which / 4) else { return };
-            code_steps(CodeCalibration::<Fixed, 11, 2>::new(&calibration, &adc), stream);
-            code_steps(CodeCalibration::<f32, 11, 2>::new(&calibration, &adc), stream);
+            code_steps(FixedCalibration::<11, 2>::new(&calibration, &adc), stream);
             if let Ok(observer) = FixedObserver::new(&calibration, &adc) {
                 observer_steps(observer, stream);
             }

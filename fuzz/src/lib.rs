@@ -4,7 +4,7 @@ use stretch_core::{Calibration, Real, Runner, Volts};
 use stretch_data::{Channel, Trial};
 use stretch_receptor::{
     Receptor,
-    code::{Adc, AdcCode, AdcSpec, CodeArithmetic, CodeCalibration, CodeReceptor, FixedObserver},
+    code::{Adc, AdcCode, AdcSpec, FixedCalibration, FixedObserver, FixedReceptor},
 };
 use stretch_recording::{ReadOptions, Recording};
 
@@ -101,13 +101,13 @@ pub fn codes(bytes: &[u8], largest: i32) -> impl Iterator<Item = AdcCode> {
 }
 
 /// A calibration over codes, where it can be converted, steps whatever comes.
-pub fn code_steps<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize>(
-    made: Result<CodeCalibration<A, WINDOW, DEGREE>, impl Sized>,
+pub fn code_steps<const WINDOW: usize, const DEGREE: usize>(
+    made: Result<FixedCalibration<WINDOW, DEGREE>, impl Sized>,
     stream: &[u8],
 ) {
     let Ok(calibration) = made else { return };
     let largest = (1 << calibration.adc_bits()) - 1;
-    let mut receptor = Runner::new(CodeReceptor::new(calibration));
+    let mut receptor = Runner::new(FixedReceptor::new(calibration));
     for code in codes(stream, largest) {
         let _ = receptor.step(code);
     }

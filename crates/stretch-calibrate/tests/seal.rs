@@ -15,7 +15,7 @@ use stretch_core::{
     Calibration, CalibrationSpec, DesignError, Interval, Model, record, strategies,
 };
 use stretch_receptor::{
-    code::{CodeCalibration, FixedCalibration, FixedObserver},
+    code::{FixedCalibration, FixedObserver},
     example_calibration, example_observer,
 };
 
@@ -83,8 +83,6 @@ fn no_flipped_bit_of_any_record_is_accepted() {
     for calibration in [linear(), example_calibration()] {
         let fixed = FixedCalibration::<11, 2>::new(&calibration, &adc).unwrap();
         none("fixed", accepted(&stored(&fixed), loads::<FixedCalibration<11, 2>>));
-        let float = CodeCalibration::<f32, 11, 2>::new(&calibration, &adc).unwrap();
-        none("f32", accepted(&stored(&float), loads::<CodeCalibration<f32, 11, 2>>));
     }
     let observer = FixedObserver::new(&example_observer(), &adc).unwrap();
     none("observer in integers", accepted(&stored(&observer), loads::<FixedObserver>));

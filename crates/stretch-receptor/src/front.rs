@@ -87,7 +87,7 @@ impl Side for Branch {
 /// The aliases of this type are [`StretchReceptor`](crate::StretchReceptor),
 /// [`HistoryReceptor`](crate::HistoryReceptor), [`ObserverReceptor`](crate::ObserverReceptor), `DiagnosedReceptor`,
 /// [`Receptor`](crate::Receptor) for any of them, and in [`code`](mod@crate::code)
-/// [`CodeReceptor`](crate::code::CodeReceptor) and [`FixedObserver`](crate::code::FixedObserver).
+/// [`FixedReceptor`](crate::code::FixedReceptor) and [`FixedObserver`](crate::code::FixedObserver).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Front<M> {
     pub(crate) model: M,

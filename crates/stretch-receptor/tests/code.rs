@@ -8,10 +8,7 @@ use stretch_core::{
 use stretch_filter::SgRate;
 use stretch_receptor::{
     Domain, StretchReceptor, Withheld,
-    code::{
-        Adc, AdcCode, AdcSpec, CodeArithmetic, CodeCalibration, CodeReceptor, FixedCalibration,
-        FixedReceptor,
-    },
+    code::{Adc, AdcCode, AdcSpec, FixedCalibration, FixedReceptor},
     example_calibration,
 };
 
@@ -43,13 +40,12 @@ struct Compared {
 }
 
 /// Runs both receptors over `codes` and checks everything but the size of the error, which it
-/// returns, in thousandths. `thousandths` converts an estimate to thousandths.
-fn compare<A: CodeArithmetic>(
+/// returns, in thousandths.
+fn compare(
     calibration: &Calibration,
     adc: &Adc,
     codes: &[i32],
-    fixed: &CodeReceptor<A, 11, 2>,
-    thousandths: impl Fn(A::Estimate) -> f64,
+    fixed: &FixedReceptor<11, 2>,
 ) -> Result<Compared, String> {
     let mut found = Compared::default();
     let (mut fixed, mut float) = (Runner::new(*fixed), Runner::new(exact(calibration)));
@@ -75,8 +71,7 @@ fn compare<A: CodeArithmetic>(
         }
         found.readings += 1;
         found.clamped += usize::from(ours.domain != Domain::Inside);
-        found.worst =
-            found.worst.max((thousandths(ours.estimate) - 1000.0 * theirs.estimate).abs());
+        found.worst = found.worst.max((f64::from(ours.estimate) - 1000.0 * theirs.estimate).abs());
     }
     Ok(found)
 }
@@ -134,7 +129,7 @@ fn every_code_at_every_rate_is_within_a_hundredth_of_a_percent() {
         for slope in SLOPES {
             for bend in [0.0, 0.7] {
                 let codes = ramp(code, slope, bend);
-                let found = compare(&calibration, &adc, &codes, &receptor, f64::from).unwrap();
+                let found = compare(&calibration, &adc, &codes, &receptor).unwrap();
                 total.readings += found.readings;
                 total.clamped += found.clamped;
                 total.worst = total.worst.max(found.worst);
@@ -147,28 +142,6 @@ fn every_code_at_every_rate_is_within_a_hundredth_of_a_percent() {
     assert!(total.worst <= stated, "{total:?}, stated {stated}");
     assert!(total.worst > 0.49, "a rounding to micrometres must show");
     assert!(stated <= 1e-4 * full_scale(&calibration), "stated {stated}");
-}
-
-#[test]
-fn floats_over_codes_agree_as_well() {
-    let (calibration, adc) = (example_calibration(), due());
-    let narrow = CodeReceptor::new(CodeCalibration::<f32, 11, 2>::new(&calibration, &adc).unwrap());
-    let wide = CodeReceptor::new(CodeCalibration::<f64, 11, 2>::new(&calibration, &adc).unwrap());
-    let (mut narrow_worst, mut wide_worst) = (0.0f64, 0.0f64);
-    for code in (0..4096).step_by(3) {
-        for slope in SLOPES {
-            let codes = ramp(code, slope, 0.3);
-            let found = compare(&calibration, &adc, &codes, &narrow, |mm| 1000.0 * f64::from(mm));
-            narrow_worst = narrow_worst.max(found.unwrap().worst);
-            let found = compare(&calibration, &adc, &codes, &wide, |mm| 1000.0 * mm);
-            wide_worst = wide_worst.max(found.unwrap().worst);
-        }
-    }
-    println!("f32 {narrow_worst} um, f64 {wide_worst} um");
-    // the errors are a few roundings of 2^-24 of 180 mm, and those of domain ends between two
-    // integers
-    assert!(narrow_worst <= 0.05, "{narrow_worst} um");
-    assert!(wide_worst <= 1e-3, "{wide_worst} um");
 }
 
 /// Calibrations, linear or poly13, whose rate estimator is the eleven-point parabola.
@@ -230,7 +203,7 @@ proptest! {
         };
         let stated = fixed.worst_case_error_um();
         prop_assert!(stated <= 1e-4 * full_scale(&calibration));
-        let found = compare(&calibration, &adc, &codes, &FixedReceptor::new(fixed), f64::from);
+        let found = compare(&calibration, &adc, &codes, &FixedReceptor::new(fixed));
         let found = found.map_err(TestCaseError::fail)?;
         prop_assert!(found.worst <= stated, "{} > {stated}", found.worst);
     }

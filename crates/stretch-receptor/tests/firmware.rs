@@ -13,17 +13,14 @@ use stretch_core::{
 use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, NamedRate, RateFilter, SgRate};
 use stretch_receptor::{
     DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading, StretchReceptor, Withheld,
-    code::{
-        Adc, AdcCode, AdcSpec, CodeArithmetic, CodeCalibration, CodeReading, CodeReceptor, Fixed,
-        FixedObserver,
-    },
+    code::{Adc, AdcCode, AdcSpec, CodeReading, FixedCalibration, FixedObserver, FixedReceptor},
     example_calibration, example_diagnosed, example_observer,
 };
 
 #[path = "../../../firmware/src/checksum.rs"]
 #[allow(missing_docs, missing_debug_implementations, unreachable_pub)]
 mod checksum;
-use checksum::{Bits, Checksum};
+use checksum::Checksum;
 
 fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../firmware")
@@ -86,12 +83,9 @@ fn record<T: serde::Serialize>(name: &str, value: &T) {
     same(&format!("data/{name}.postcard"), bytes);
 }
 
-fn codes<A: CodeArithmetic>(calibration: &Calibration) -> String
-where
-    A::Estimate: Bits,
-{
-    let calibration = CodeCalibration::<A, 11, 2>::new(calibration, &due()).unwrap();
-    let receptor = CodeReceptor::new(calibration);
+fn codes(calibration: &Calibration) -> String {
+    let calibration = FixedCalibration::<11, 2>::new(calibration, &due()).unwrap();
+    let receptor = FixedReceptor::new(calibration);
     let (mut memory, mut checksum) = (receptor.memory(), Checksum::default());
     for code in trial() {
         let code = if code == u16::MAX { AdcCode::MISSING } else { AdcCode(code.into()) };
@@ -206,10 +200,8 @@ fn the_trial_and_the_records_are_these() {
     same("data/trial.u16le", &bytes);
     for (name, calibration) in [("poly13", example_calibration()), ("linear", linear())] {
         record(name, &calibration);
-        let fixed = CodeCalibration::<Fixed, 11, 2>::new(&calibration, &due()).unwrap();
+        let fixed = FixedCalibration::<11, 2>::new(&calibration, &due()).unwrap();
         record(&format!("{name}-fixed"), &fixed);
-        let float = CodeCalibration::<f32, 11, 2>::new(&calibration, &due()).unwrap();
-        record(&format!("{name}-f32"), &float);
     }
     for (_, name, calibration) in histories() {
         record(name, &calibration);
@@ -233,10 +225,8 @@ fn the_golden_checksums_are_these() {
     let sg = SgRate::<f32, 11, 2>::new(hz).unwrap();
     let differentiated = named(&poly13, RateEstimator::Differentiator { cutoff_hz: 5.0 });
     let golden = [
-        ("poly13-fixed", codes::<Fixed>(&poly13)),
-        ("linear-fixed", codes::<Fixed>(&linear)),
-        ("poly13-f32", codes::<f32>(&poly13)),
-        ("linear-f32", codes::<f32>(&linear)),
+        ("poly13-fixed", codes(&poly13)),
+        ("linear-fixed", codes(&linear)),
         ("poly13-f32-volts", volts(&poly13, sg)),
         ("linear-f32-volts", volts(&linear, sg)),
         ("poly13-f32-volts-integer", volts(&poly13, IntegerSgRate::<11, 2>::new(hz, 3.3).unwrap())),

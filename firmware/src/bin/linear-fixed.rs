@@ -5,4 +5,4 @@
 use stretch_firmware::program;
 use stretch_receptor::code::FixedReceptor;
 
-program!(codes, FixedReceptor<11, 2>, i32, FixedReceptor::new, "linear-fixed" from "linear-fixed");
+program!(codes, FixedReceptor<11, 2>, FixedReceptor::new, "linear-fixed" from "linear-fixed");

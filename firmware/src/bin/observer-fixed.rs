@@ -8,7 +8,7 @@ use stretch_firmware::program;
 use stretch_receptor::code::FixedObserver;
 
 program!(
-    codes, FixedObserver, i32, identity,
+    codes, FixedObserver, identity,
     "observer-fixed" from "observer-fixed",
     "observer+rest-fixed" from "observer-rest-fixed",
 );

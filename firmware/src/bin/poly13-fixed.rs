@@ -6,4 +6,4 @@
 use stretch_firmware::program;
 use stretch_receptor::code::FixedReceptor;
 
-program!(codes, FixedReceptor<11, 2>, i32, FixedReceptor::new, "poly13-fixed" from "poly13-fixed");
+program!(codes, FixedReceptor<11, 2>, FixedReceptor::new, "poly13-fixed" from "poly13-fixed");

@@ -10,7 +10,7 @@ use stretch_core::{
 use stretch_filter::{Differentiator, IntegerSgRate, LowPassSpec, RateFilter, SgRate};
 use stretch_receptor::{
     DiagnosedReceptor, HistoryReceptor, ObserverReceptor, Reading, StretchReceptor, Withheld,
-    code::{AdcCode, CodeCalibration, CodeReading, CodeReceptor, Fixed, FixedObserver},
+    code::{AdcCode, CodeReading, FixedCalibration, FixedObserver, FixedReceptor},
 };
 use stretch_sleeve::{ArrayCalibration, ArrayReceptor};
 
@@ -61,14 +61,10 @@ pub(crate) fn checksums() -> Result<String, Said> {
     let low_pass = LowPassSpec { cutoff: Hertz(5.0), sample_rate: hz };
     let tracker = RateEstimator::Tracker { tracking_index: 0.1 };
 
-    let code: CodeCalibration<Fixed, 11, 2> = record!("poly13-fixed");
-    codes(&mut out, "poly13-fixed", CodeReceptor::new(code));
-    let code: CodeCalibration<Fixed, 11, 2> = record!("linear-fixed");
-    codes(&mut out, "linear-fixed", CodeReceptor::new(code));
-    let code: CodeCalibration<f32, 11, 2> = record!("poly13-f32");
-    codes(&mut out, "poly13-f32", CodeReceptor::new(code));
-    let code: CodeCalibration<f32, 11, 2> = record!("linear-f32");
-    codes(&mut out, "linear-f32", CodeReceptor::new(code));
+    let code: FixedCalibration<11, 2> = record!("poly13-fixed");
+    codes(&mut out, "poly13-fixed", FixedReceptor::new(code));
+    let code: FixedCalibration<11, 2> = record!("linear-fixed");
+    codes(&mut out, "linear-fixed", FixedReceptor::new(code));
 
     let named = |model: &str| format!("poly13-f32-{model}");
     volts(&mut out, &named("volts"), StretchReceptor::with_rate(&poly13, sg)?);

@@ -8,18 +8,17 @@ use stretch_filter::{FixedSgIntegers, FixedSgRate};
 
 use super::{
     adc::Adc,
-    arithmetic::CodeArithmetic,
     code_map::CodeMap,
-    fixed_arithmetic::{Fixed, Scaled, worst_case},
     fold::{Units, fold},
+    scaled::{FixedMap, Scaled, round, worst_case},
 };
 use crate::{ReceptorError, fold::output};
 
 /// The schema version of the converted calibrations that this release writes, and the newest that it reads.
 pub const CODE_SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 
-/// A [`Calibration`] converted for the codes of one converter, in the arithmetic `A`, with a Savitzky-Golay rate
-/// estimator of shape `WINDOW`, `DEGREE` and `DELAY`.
+/// A [`Calibration`] converted for the codes of one converter, in fixed point, with a Savitzky-Golay rate estimator of
+/// shape `WINDOW`, `DEGREE` and `DELAY`.
 ///
 /// Everything affine (volts per code, both normalisations, the target's unit, the sample rate, the polarity) is folded
 /// into the coefficients. The serialised form (feature `serde`) takes about 100 bytes of a board's flash. It is checked
@@ -35,24 +34,20 @@ pub const CODE_SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 /// # Ok::<(), stretch_receptor::ReceptorError>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CodeCalibration<
-    A: CodeArithmetic,
-    const WINDOW: usize,
-    const DEGREE: usize,
-    const DELAY: usize = 0,
-> {
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(try_from = "super::code_record::CodeRecord", into = "super::code_record::CodeRecord")
+)]
+pub struct FixedCalibration<const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> {
     pub(super) bits: u8,
     pub(super) sample_rate: SampleRate,
     /// Whether the target falls as the signal rises.
     pub(super) falling: bool,
     /// Dead band: the largest magnitude of the rate at which the branch does not change.
     pub(super) dead_band: i32,
-    pub(super) surfaces: CodeMap<A::Line, A::Surface>,
+    pub(super) surfaces: FixedMap,
 }
-
-/// A calibration in fixed point: [`CodeCalibration`] in [`Fixed`].
-pub type FixedCalibration<const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
-    CodeCalibration<Fixed, WINDOW, DEGREE, DELAY>;
 
 /// The numbers of a [`FixedReceptor`](super::FixedReceptor).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,8 +64,8 @@ pub struct FixedNumbers {
     pub rate: FixedSgIntegers,
 }
 
-impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
-    CodeCalibration<A, WINDOW, DEGREE, DELAY>
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    FixedCalibration<WINDOW, DEGREE, DELAY>
 {
     /// Converts a calibration for the codes of `adc`.
     ///
@@ -81,9 +76,8 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
     ///   degree or delay than this type (`rate.*`);
     /// - the model is neither a line nor surfaces (`model`), or a surface has terms beyond those of
     ///   poly13 (`model.surface.terms`);
-    /// - a number does not fit into the arithmetic (`fixed.*`, `surface`);
-    /// - in fixed point, the [worst-case error](FixedCalibration::worst_case_error_um) exceeds
-    ///   0.01 % of the target's span (`fixed.error`).
+    /// - a number does not fit into 32 bits (`fixed.*`);
+    /// - the [worst-case error](Self::worst_case_error_um) exceeds 0.01 % of the target's span (`fixed.error`).
     pub fn new(calibration: &Calibration, adc: &Adc) -> Result<Self, ReceptorError> {
         Self::check_estimator(calibration.spec().rate_estimator)?;
         let units = Units::new(
@@ -93,11 +87,10 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
             FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::LARGEST,
         )?;
         let dead_band = libm::floor(calibration.spec().dead_band / units.rate_v_per_s);
-        let surfaces = A::round(&fold(calibration, &units)?)?;
+        let surfaces = round(&fold(calibration, &units)?)?;
         let (gain, _) = output(calibration);
-        if let Some(error) = A::worst_case(&surfaces, Self::rate_rounding()) {
-            DesignError::check("fixed.error", error, error <= 1e-4 * 1000.0 * gain.abs())?;
-        }
+        let error = worst_case(&surfaces, Self::rate_rounding());
+        DesignError::check("fixed.error", error, error <= 1e-4 * 1000.0 * gain.abs())?;
         Ok(Self {
             bits: adc.spec().bits,
             sample_rate: calibration.spec().sample_rate_hz,
@@ -139,11 +132,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
     fn rate_rounding() -> f64 {
         if FixedSgRate::<u16, WINDOW, DEGREE, DELAY>::SHIFT == 0 { 0.0 } else { 0.5 }
     }
-}
 
-impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
-    FixedCalibration<WINDOW, DEGREE, DELAY>
-{
     /// Returns the integers in a type without shape parameters, for an implementation of the step in another language.
     pub fn numbers(&self) -> FixedNumbers {
         FixedNumbers {

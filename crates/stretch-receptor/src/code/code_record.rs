@@ -1,16 +1,16 @@
 //! The serialised form of a converted calibration, which is checked while it loads.
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
+use serde::{Deserialize, Serialize};
 use stretch_core::{DesignError, SampleRate};
 
 use super::{
-    arithmetic::CodeArithmetic,
-    calibration::{CODE_SCHEMA, CodeCalibration},
+    calibration::{CODE_SCHEMA, FixedCalibration},
     code_map::{CodeMap, CodeSurface},
+    scaled::FixedMap,
 };
 
 #[derive(Serialize, Deserialize)]
-struct CodeRecord<L, P> {
+pub(super) struct CodeRecord {
     /// Schema version. This field is first, so that a newer schema is refused before the rest is read.
     schema: u32,
     /// Window, degree and delay of the rate estimator.
@@ -20,45 +20,31 @@ struct CodeRecord<L, P> {
     falling: bool,
     dead_band: i32,
     #[serde(rename = "sheets")]
-    surfaces: CodeMap<L, P>,
+    surfaces: FixedMap,
 }
 
-impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Serialize
-    for CodeCalibration<A, WINDOW, DEGREE, DELAY>
-where
-    A::Line: Serialize,
-    A::Surface: Serialize,
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    From<FixedCalibration<WINDOW, DEGREE, DELAY>> for CodeRecord
 {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        CodeRecord {
+    fn from(own: FixedCalibration<WINDOW, DEGREE, DELAY>) -> Self {
+        Self {
             schema: CODE_SCHEMA,
             shape: (WINDOW as u16, DEGREE as u8, DELAY as u16),
-            adc_bits: self.bits,
-            sample_rate_hz: self.sample_rate,
-            falling: self.falling,
-            dead_band: self.dead_band,
-            surfaces: self.surfaces,
+            adc_bits: own.bits,
+            sample_rate_hz: own.sample_rate,
+            falling: own.falling,
+            dead_band: own.dead_band,
+            surfaces: own.surfaces,
         }
-        .serialize(serializer)
     }
 }
 
-impl<'de, A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
-    Deserialize<'de> for CodeCalibration<A, WINDOW, DEGREE, DELAY>
-where
-    A::Line: Deserialize<'de>,
-    A::Surface: Deserialize<'de>,
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize> TryFrom<CodeRecord>
+    for FixedCalibration<WINDOW, DEGREE, DELAY>
 {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        let record = CodeRecord::<A::Line, A::Surface>::deserialize(deserializer)?;
-        Self::check(record).map_err(D::Error::custom)
-    }
-}
+    type Error = DesignError;
 
-impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
-    CodeCalibration<A, WINDOW, DEGREE, DELAY>
-{
-    fn check(record: CodeRecord<A::Line, A::Surface>) -> Result<Self, DesignError> {
+    fn try_from(record: CodeRecord) -> Result<Self, DesignError> {
         let CodeRecord { schema, shape, adc_bits, sample_rate_hz, falling, dead_band, surfaces } =
             record;
         if !(1..=CODE_SCHEMA).contains(&schema) {
@@ -69,11 +55,11 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         DesignError::check("dead_band", dead_band.into(), dead_band >= 0)?;
         let spans = match &surfaces {
             CodeMap::Line(ranged) => {
-                A::valid_line(&ranged.surface)?;
+                ranged.surface.check()?;
                 ranged.holds()
             }
             CodeMap::Poly13(both) => {
-                both.iter().try_for_each(|ranged| A::valid_surface(&ranged.surface))?;
+                both.iter().try_for_each(|ranged| ranged.surface.check())?;
                 both.iter().all(CodeSurface::holds)
             }
         };

@@ -4,19 +4,15 @@ use stretch_core::{Branch, Design, Stage};
 use stretch_filter::{FixedSgMemory, FixedSgRate};
 
 use super::{
-    adc::AdcCode,
-    arithmetic::CodeArithmetic,
-    calibration::CodeCalibration,
-    code_map::{CodeMap, CodeSurface},
-    fixed_arithmetic::Fixed,
-    reading::CodeReading,
+    adc::AdcCode, calibration::FixedCalibration, code_map::CodeMap, reading::CodeReading,
+    scaled::FixedMap,
 };
 use crate::{
     Front,
     front::{Live, Side},
 };
 
-/// A stretch receptor for converter codes, in the arithmetic `A`.
+/// A stretch receptor for converter codes, in 32-bit fixed point. Estimates are thousandths of the reference's unit.
 ///
 /// The receptor answers like [`StretchReceptor`](crate::StretchReceptor), for codes instead of volts: the same
 /// warm-up, the same branch with the same dead band, the same clamped domain, and the same bridge over up to
@@ -24,7 +20,7 @@ use crate::{
 /// converter's range and is rounded to 16 bits of that range, and there is no rate of the estimate.
 ///
 /// No step can overflow, whatever the codes are: codes that the converter does
-/// not have are missing samples, and a [`CodeCalibration`] whose numbers could
+/// not have are missing samples, and a [`FixedCalibration`] whose numbers could
 /// leave 32 bits is refused.
 ///
 /// ```
@@ -45,17 +41,12 @@ use crate::{
 /// assert_eq!(receptor.step(AdcCode::MISSING), Err(Withheld::Missing));
 /// # Ok::<(), stretch_receptor::ReceptorError>(())
 /// ```
-pub type CodeReceptor<A, const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
-    Front<CodeSurfaces<A, WINDOW, DEGREE, DELAY>>;
+pub type FixedReceptor<const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
+    Front<CodeSurfaces<WINDOW, DEGREE, DELAY>>;
 
-/// The model of a [`CodeReceptor`].
+/// The model of a [`FixedReceptor`].
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CodeSurfaces<
-    A: CodeArithmetic,
-    const WINDOW: usize,
-    const DEGREE: usize,
-    const DELAY: usize,
-> {
+pub struct CodeSurfaces<const WINDOW: usize, const DEGREE: usize, const DELAY: usize> {
     /// The number of codes, which is the smallest number that is not a code.
     codes: u32,
     /// Factor that left-aligns a code in 16 bits.
@@ -63,14 +54,10 @@ pub struct CodeSurfaces<
     dead_band: i32,
     /// All bits set if the target falls as the signal rises, otherwise zero.
     mirror: i32,
-    surfaces: CodeMap<A::Line, A::Surface>,
+    surfaces: FixedMap,
 }
 
-/// The receptor in fixed point: [`CodeReceptor`] in [`Fixed`].
-pub type FixedReceptor<const WINDOW: usize, const DEGREE: usize, const DELAY: usize = 0> =
-    CodeReceptor<Fixed, WINDOW, DEGREE, DELAY>;
-
-/// The state of a [`CodeReceptor`]'s model.
+/// The state of a [`FixedReceptor`]'s model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CodeMemory<const WINDOW: usize> {
     window: FixedSgMemory<u16, WINDOW>,
@@ -99,30 +86,21 @@ impl Side for SideBit {
     }
 }
 
-impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
-    CodeReceptor<A, WINDOW, DEGREE, DELAY>
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    FixedReceptor<WINDOW, DEGREE, DELAY>
 {
     /// Creates the receptor of a converted calibration.
-    pub fn new(calibration: CodeCalibration<A, WINDOW, DEGREE, DELAY>) -> Self {
-        let CodeCalibration { bits, falling, dead_band, surfaces, .. } = calibration;
+    pub fn new(calibration: FixedCalibration<WINDOW, DEGREE, DELAY>) -> Self {
+        let FixedCalibration { bits, falling, dead_band, surfaces, .. } = calibration;
         let bits = u32::from(bits.min(16));
         let mirror = -i32::from(falling);
         let (codes, align) = (1 << bits, 1 << (16 - bits));
-        let surfaces = match surfaces {
-            CodeMap::Line(s) => {
-                CodeMap::Line(CodeSurface { surface: A::line_over(s.surface, &s.signal), ..s })
-            }
-            CodeMap::Poly13(both) => CodeMap::Poly13(both.map(|s| CodeSurface {
-                surface: A::surface_over(s.surface, &s.signal, &s.rate),
-                ..s
-            })),
-        };
         Self { model: CodeSurfaces { codes, align, dead_band, mirror, surfaces } }
     }
 }
 
-impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
-    CodeSurfaces<A, WINDOW, DEGREE, DELAY>
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
+    CodeSurfaces<WINDOW, DEGREE, DELAY>
 {
     const RATE: FixedSgRate<u16, WINDOW, DEGREE, DELAY> = FixedSgRate::new();
 
@@ -141,8 +119,8 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
     }
 }
 
-impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Design
-    for CodeSurfaces<A, WINDOW, DEGREE, DELAY>
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Design
+    for CodeSurfaces<WINDOW, DEGREE, DELAY>
 {
     type Memory = CodeMemory<WINDOW>;
 
@@ -151,13 +129,13 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
     }
 }
 
-impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Live
-    for CodeSurfaces<A, WINDOW, DEGREE, DELAY>
+impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize> Live
+    for CodeSurfaces<WINDOW, DEGREE, DELAY>
 {
     type Sample = AdcCode;
     type Signal = u16;
     type Side = SideBit;
-    type Reading = CodeReading<A::Estimate>;
+    type Reading = CodeReading<i32>;
 
     #[inline(always)]
     fn signal(&self, code: AdcCode) -> Option<u16> {
@@ -171,7 +149,7 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         memory: &mut CodeMemory<WINDOW>,
         side: &mut SideBit,
         sample: u16,
-    ) -> Option<CodeReading<A::Estimate>> {
+    ) -> Option<CodeReading<i32>> {
         let rate = match (Self::RATE.step(&mut memory.window, sample), &self.surfaces) {
             (Some(rate), _) => rate,
             // a line needs no rate
@@ -184,13 +162,13 @@ impl<A: CodeArithmetic, const WINDOW: usize, const DEGREE: usize, const DELAY: u
         let (estimate, domain) = match &self.surfaces {
             CodeMap::Line(ranged) => {
                 let (volts, domain) = ranged.input(sample);
-                (A::line(&ranged.surface, &ranged.signal, volts), domain)
+                (ranged.surface.at(&ranged.signal, volts), domain)
             }
             CodeMap::Poly13(surfaces) => {
                 let ranged = &surfaces[usize::from(now.0 & 1)];
                 let (volts, rate, domain) = ranged.inputs(sample, rate);
                 let (volts, rate) = ((&ranged.signal, volts), (&ranged.rate, rate));
-                (A::surface(&ranged.surface, volts, rate), domain)
+                (ranged.surface.at(volts, rate), domain)
             }
         };
         Some(CodeReading { estimate, branch, domain })

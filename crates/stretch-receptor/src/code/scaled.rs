@@ -6,14 +6,12 @@ use stretch_core::{
 };
 
 use super::{
-    arithmetic::{CodeArithmetic, sealed},
     code_map::{COARSE_BITS, CodeMap, Span},
     fold::Folded,
 };
 
-/// 32-bit fixed point; estimates are thousandths of the reference's unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Fixed {}
+/// One line for both branches, or a surface for each, in fixed point.
+pub(super) type FixedMap = CodeMap<Scaled<FixedLine>, Scaled<FixedPoly13>>;
 
 /// A fixed-point line or surface in units of `2^-bits` thousandths. Its constant term includes half a thousandth, so
 /// that truncation rounds to the nearest thousandth.
@@ -27,7 +25,8 @@ pub struct Scaled<S> {
 }
 
 impl<S> Scaled<S> {
-    fn check(&self) -> Result<(), DesignError> {
+    #[cfg(feature = "serde")]
+    pub(super) fn check(&self) -> Result<(), DesignError> {
         let holds = self.thousandths > 0;
         DesignError::check("fixed.thousandths", self.thousandths.into(), holds).map(|_| ())
     }
@@ -43,61 +42,35 @@ impl<S> Scaled<S> {
 /// more range than the bits gain in precision. With fewer bits, the factor `2^(32 - bits)` would not fit an `i32`.
 const BITS: core::ops::RangeInclusive<u8> = 2..=16;
 
-impl CodeArithmetic for Fixed {}
-impl sealed::Arithmetic for Fixed {
-    type Line = Scaled<FixedLine>;
-    type Surface = Scaled<FixedPoly13>;
-    type Estimate = i32;
-
-    /// Rounds the surfaces with the largest number of fraction bits that fits.
-    fn round(folded: &Folded) -> Result<CodeMap<Self::Line, Self::Surface>, DesignError> {
-        let mut refused = DesignError::OutOfRange { field: "fixed.bits", value: 0.0 };
-        for bits in BITS.rev() {
-            match fixed_with(folded, bits) {
-                Ok(surfaces) => return Ok(surfaces),
-                Err(error) => refused = error,
-            }
-        }
-        Err(refused)
-    }
-
-    fn worst_case(
-        surfaces: &CodeMap<Self::Line, Self::Surface>,
-        rate_rounding: f64,
-    ) -> Option<f64> {
-        Some(worst_case(surfaces, rate_rounding))
-    }
-
-    fn line_over(line: Self::Line, _: &Span) -> Self::Line {
-        line
-    }
-    fn surface_over(surface: Self::Surface, _: &Span, _: &Span) -> Self::Surface {
-        surface
-    }
+impl Scaled<FixedLine> {
+    /// Evaluates the line at a signal inside its span.
     #[inline(always)]
-    fn line(line: &Self::Line, signal: &Span, volts: i32) -> i32 {
-        line.finish(line.of.eval(signal.spread(volts)))
-    }
-    #[inline(always)]
-    fn surface(
-        surface: &Self::Surface,
-        (signal, volts): (&Span, i32),
-        (rate_span, rate): (&Span, i32),
-    ) -> i32 {
-        surface.finish(surface.of.eval(rate_span.spread(rate), signal.spread(volts)))
-    }
-    fn valid_line(line: &Self::Line) -> Result<(), DesignError> {
-        line.check()
-    }
-    fn valid_surface(surface: &Self::Surface) -> Result<(), DesignError> {
-        surface.check()
+    pub(super) fn at(&self, signal: &Span, volts: i32) -> i32 {
+        self.finish(self.of.eval(signal.spread(volts)))
     }
 }
 
-fn fixed_with(
-    folded: &Folded,
-    bits: u8,
-) -> Result<CodeMap<Scaled<FixedLine>, Scaled<FixedPoly13>>, DesignError> {
+impl Scaled<FixedPoly13> {
+    /// Evaluates the surface at a signal and a rate inside their spans.
+    #[inline(always)]
+    pub(super) fn at(&self, (signal, volts): (&Span, i32), (rate, r): (&Span, i32)) -> i32 {
+        self.finish(self.of.eval(rate.spread(r), signal.spread(volts)))
+    }
+}
+
+/// Rounds the surfaces with the largest number of fraction bits that fits.
+pub(super) fn round(folded: &Folded) -> Result<FixedMap, DesignError> {
+    let mut refused = DesignError::OutOfRange { field: "fixed.bits", value: 0.0 };
+    for bits in BITS.rev() {
+        match fixed_with(folded, bits) {
+            Ok(surfaces) => return Ok(surfaces),
+            Err(error) => refused = error,
+        }
+    }
+    Err(refused)
+}
+
+fn fixed_with(folded: &Folded, bits: u8) -> Result<FixedMap, DesignError> {
     let scale = 1000.0 * f64::from(1u32 << bits);
     let half = 0.5 * f64::from(1u32 << bits);
     let thousandths = 1 << (32 - bits);
@@ -125,10 +98,7 @@ fn fixed_with(
 /// real numbers, in thousandths of the reference's unit. If there are two surfaces, it is the larger
 /// of their bounds. See
 /// [`FixedCalibration::worst_case_error_um`](super::FixedCalibration::worst_case_error_um).
-pub(super) fn worst_case(
-    surfaces: &CodeMap<Scaled<FixedLine>, Scaled<FixedPoly13>>,
-    rate_rounding: f64,
-) -> f64 {
+pub(super) fn worst_case(surfaces: &FixedMap, rate_rounding: f64) -> f64 {
     // an end of a domain is rounded to a whole number, which adds up to one to the rate's own rounding
     let spread = |factor: i32, rounding: f64| libm::ldexp(rounding * f64::from(factor), -32);
     let signal = |factor: i32| spread(factor, 1.0 + f64::from(1u32 << COARSE_BITS) * SIGNAL_F64);

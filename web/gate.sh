@@ -57,8 +57,7 @@ stretch calibrate "${trials[@]}" --model poly13 --out "$fresh/surface.json" --re
 stretch calibrate "${trials[@]}" --model observer --out "$fresh/memory.json" --report "$fresh/memory.html" >/dev/null
 stretch diagnose "$bench" --report "$fresh/diagnosis.html" --json="$fresh/diagnosis.json" >"$fresh/diagnosis.txt"
 stretch demo --out "$fresh/demo" >/dev/null
-stretch demo --paper --out "$fresh/paper" >/dev/null
-reports=("$fresh"/{surface,memory,diagnosis}.html "$fresh"/demo/report.html "$fresh"/paper/paper.html)
+reports=("$fresh"/{surface,memory,diagnosis}.html "$fresh"/demo/report.html)
 # the page that challenge/gate.sh wrote last
 challenge=$target/challenge-check/report.html
 if [ -f "$challenge" ]; then reports+=("$challenge"); else skip "the challenge's page: challenge/gate.sh writes one"; fi

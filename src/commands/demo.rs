@@ -63,7 +63,7 @@ pub(crate) struct Args {
     /// Measured sessions instead of simulated ones: a folder, FOLDER/GROUP, or a file with several
     ///
     /// Without a group, the first by name is used.
-    #[arg(long, value_name = "DIR", conflicts_with = "paper")]
+    #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
     /// Column of the reference [default: length_mm or angle_deg]
     #[arg(long, requires = "data", value_name = "COL", value_parser = column)]
@@ -74,8 +74,8 @@ pub(crate) struct Args {
     /// Replace an existing demo; other files in its folder are kept
     #[arg(long)]
     force: bool,
-    /// Write the paper's tables instead, with simulated next to published values
-    #[arg(long)]
+    /// Print the paper's tables instead, with simulated next to published values
+    #[arg(long, conflicts_with_all = ["out", "data", "force"])]
     paper: bool,
     #[command(flatten)]
     json: Json,
@@ -86,7 +86,7 @@ const SEED: u64 = 3;
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     if args.paper {
-        return crate::paper::run(&args.out, args.force, SEED, &args.json);
+        return crate::paper::run(SEED, &args.json);
     }
     let mut done = None;
     let written = write_folder(&args.out, args.force, |folder| {

@@ -9,8 +9,6 @@ use stretch_calibrate::{
 use stretch_data::{Trial, TrialKind};
 use stretch_sim::{Rig, RunSettings, Session, TrialPlan};
 
-use super::responses::{FrequencyPoint, GapPoint, frequency_response, pulse_gaps};
-
 /// The paper's experiment on a simulated rig.
 #[derive(Debug, Clone)]
 pub(crate) struct Experiment {
@@ -22,10 +20,6 @@ pub(crate) struct Experiment {
     /// Our method: the rate is from the same causal estimator in calibration and in use, every
     /// trial is normalised by the ranges of the calibration, and there is a dead band.
     pub(crate) ours: Pipeline,
-    /// Error as a function of the gap between two pulses.
-    pub(crate) gaps: Vec<GapPoint>,
-    /// Frequency response of the sensor.
-    pub(crate) frequency: Vec<FrequencyPoint>,
 }
 
 impl Experiment {
@@ -44,9 +38,7 @@ impl Experiment {
         }
         let published = Pipeline::run(&Options::paper(), &ramps, &arbitrary, &pulses, true)?;
         let ours = Pipeline::run(&Options::default(), &ramps, &arbitrary, &pulses, false)?;
-        let gaps = pulse_gaps(&mut session, &published, &ours)?;
-        let frequency = frequency_response(rig)?;
-        Ok(Self { seed, published, ours, gaps, frequency })
+        Ok(Self { seed, published, ours })
     }
 
     /// Returns all results as JSON.
@@ -55,8 +47,6 @@ impl Experiment {
             "seed": self.seed,
             "published": self.published.to_json(),
             "ours": self.ours.to_json(),
-            "gaps": self.gaps,
-            "frequency": self.frequency,
         })
     }
 }
@@ -93,14 +83,19 @@ impl Pipeline {
         } else {
             Some(calibrate(ramps, &Options { model, ..options.clone() })?)
         };
-        let judge = |trials| judge(&linear, &non_linear, observer.as_ref(), trials, own_ranges);
+        let judge = |trials: &[Trial]| -> anyhow::Result<Evaluation> {
+            let (mut line, mut surfaces) =
+                (linear.calibration.clone(), non_linear.calibration.clone());
+            if own_ranges && let [trial] = trials {
+                line = on_own_ranges(&line, trial)?;
+                surfaces = on_own_ranges(&surfaces, trial)?;
+            }
+            let mut methods = vec![("linear", &line), ("non-linear", &surfaces)];
+            methods.extend(observer.as_ref().map(|observer| ("observer", &observer.calibration)));
+            Ok(evaluate(&methods, trials)?)
+        };
         let (arbitrary, pulses) = (judge(arbitrary)?, judge(pulses)?);
         Ok(Self { linear, non_linear, observer, arbitrary, pulses })
-    }
-
-    /// Evaluates all methods on other trials, with fixed ranges or with each trial's own range.
-    pub(super) fn judge(&self, trials: &[Trial], own_ranges: bool) -> anyhow::Result<Evaluation> {
-        judge(&self.linear, &self.non_linear, self.observer.as_ref(), trials, own_ranges)
     }
 
     fn to_json(&self) -> Value {
@@ -108,23 +103,4 @@ impl Pipeline {
         let fits: Vec<&FitReport> = calibrated.flat_map(|calibrated| &calibrated.fits).collect();
         json!({ "fits": fits, "arbitrary": self.arbitrary, "pulses": self.pulses })
     }
-}
-
-/// Evaluates the raw signal and all methods on trials, with fixed ranges or with each trial's own
-/// range.
-fn judge(
-    linear: &Calibrated,
-    non_linear: &Calibrated,
-    observer: Option<&Calibrated>,
-    trials: &[Trial],
-    own_ranges: bool,
-) -> anyhow::Result<Evaluation> {
-    let (mut line, mut surfaces) = (linear.calibration.clone(), non_linear.calibration.clone());
-    if own_ranges && let [trial] = trials {
-        line = on_own_ranges(&line, trial)?;
-        surfaces = on_own_ranges(&surfaces, trial)?;
-    }
-    let mut methods = vec![("linear", &line), ("non-linear", &surfaces)];
-    methods.extend(observer.map(|observer| ("observer", &observer.calibration)));
-    Ok(evaluate(&methods, trials)?)
 }

@@ -7,43 +7,23 @@
 //! their order of magnitude can be compared.
 
 mod experiment;
-mod page;
-mod responses;
 mod tables;
 
-use std::path::Path;
-
-use stretch_data::files::write_folder;
 use stretch_sim::paper_preset;
 
 use crate::commands::{
     json::Json,
-    shared::{or_force, progress, say, tell, write_text},
+    shared::{progress, say},
 };
-use crate::table::{number, table, table_text};
+use crate::table::table_text;
 use experiment::Experiment;
-use page::paper_page;
 use tables::{PUBLISHED, error_tables, fit_table, verdicts};
 
-pub(crate) fn run(out: &Path, force: bool, seed: u64, json: &Json) -> anyhow::Result<()> {
-    let mut done = None;
-    let written = write_folder(out, force, |folder| {
-        let bar = progress("simulating, fitting, evaluating", 1);
-        let experiment = Experiment::run(&paper_preset()?, seed)?;
-        bar.finish_and_clear();
-        write_text(&folder.join("paper.html"), &paper_page(&experiment))?;
-        let text = serde_json::to_string_pretty(&experiment.to_json())?;
-        write_text(&folder.join("paper.json"), &text)?;
-        done = Some(experiment);
-        anyhow::Ok(())
-    });
-    written.map_err(or_force)?;
-    let Some(experiment) = done else { return Ok(()) };
-    json.answer(&experiment.to_json(), || print(&experiment, seed))?;
-    if json.is_printed() {
-        return Ok(());
-    }
-    tell(format!("\nwrote {}: paper.html (open it), paper.json", out.display()))
+pub(crate) fn run(seed: u64, json: &Json) -> anyhow::Result<()> {
+    let bar = progress("simulating, fitting, evaluating", 1);
+    let experiment = Experiment::run(&paper_preset()?, seed)?;
+    bar.finish_and_clear();
+    json.answer(&experiment.to_json(), || print(&experiment, seed))
 }
 
 /// Prints the paper's tables with our values.
@@ -65,26 +45,6 @@ fn print(experiment: &Experiment, seed: u64) -> anyhow::Result<()> {
             test.blocks
         ))?;
     }
-    say("\nError against the gap between two pulses, RMSE in mm (non-linear):")?;
-    let rows = experiment.gaps.iter().map(|point| {
-        vec![
-            format!("{:.2}", point.gap_s),
-            number(point.ours_rmse_mm[0]),
-            number(point.published_rmse_mm[2]),
-            number(point.ours_rmse_mm[2]),
-            number(point.ours_rmse_mm[3]),
-        ]
-    });
-    say(table(&["gap s", "raw", "as published", "ours", "observer"], rows))?;
-    say("\nFrequency response of the sensor (3 mm about mid-stroke):")?;
-    let rows = experiment.frequency.iter().map(|point| {
-        vec![
-            number(point.frequency_hz),
-            number(1000.0 * point.gain_v_per_mm),
-            format!("{:.1}", point.lead_deg),
-        ]
-    });
-    say(table(&["Hz", "gain mV/mm", "lead deg"], rows))?;
     say("\nWhat agrees and what does not:")?;
     verdicts(experiment).iter().try_for_each(|sentence| say(format!("- {sentence}")))
 }

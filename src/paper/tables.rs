@@ -1,5 +1,4 @@
-//! Comparison with the figures of the published method ("the paper"): tables and sentences, for a
-//! terminal and a page.
+//! Comparison with the figures of the published method ("the paper"): tables and sentences.
 
 use stretch_calibrate::{Evaluation, FitReport};
 use stretch_report::{Table, number};

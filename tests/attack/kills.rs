@@ -30,13 +30,11 @@ const fn writing(line: &'static str, weight: usize, at_once: bool) -> Writing {
     Writing { line, weight, at_once }
 }
 
-const WRITING: [Writing; 14] = [
+const WRITING: [Writing; 12] = [
     writing("simulate --protocol pulses --out new", 4, true),
     writing("simulate --protocol paper --out bench --force", 8, true),
     writing("simulate --protocol pulses --out bench --force", 8, true),
     writing("export --calibration board.json --c c --arduino", 3, true),
-    writing("demo --paper --out demo", 1, true),
-    writing("demo --paper --out bench --force", 1, true),
     writing("calibrate a.csv --out cal.json --report cal.html", 8, false),
     writing("export --calibration board.json --fixed cal.postcard --c c", 3, false),
     writing(

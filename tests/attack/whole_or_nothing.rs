@@ -87,9 +87,7 @@ fn folders_that_hold_something_are_refused_and_replaced_when_forced() {
         command.current_dir(scratch.path("")).args(line.split(' '));
         command
     };
-    for line in
-        ["demo --out bench", "demo --paper --out bench", "simulate --protocol pulses --out bench"]
-    {
+    for line in ["demo --out bench", "simulate --protocol pulses --out bench"] {
         fails(&mut said(line), &["bench", "it exists", "--force", "other files are kept"]);
     }
     fails(&mut said("export --calibration board.json --c bench"), &["bench", "exists"]);
@@ -216,10 +214,9 @@ impl Drop for Mount {
 }
 
 /// Commands whose output is below a folder `disk`.
-const ONTO_A_DISK: [&str; 8] = [
+const ONTO_A_DISK: [&str; 7] = [
     "simulate --protocol paper --out disk/new",
     "simulate --protocol paper --out disk/bench --force",
-    "demo --paper --out disk/demo",
     "export --calibration board.json --c disk/c",
     "calibrate a.csv --out disk/cal.json --report disk/cal.html",
     "diagnose a.csv --reference length_mm --signal bridge_v --no-next --json=disk/d.json --report disk/d.html",
@@ -281,7 +278,7 @@ fn a_quota_that_is_reached_is_like_a_full_disk() {
     let scratch = prepared();
     let before = tree(&scratch.path(""));
     // A file size limit acts like a full disk. Its signal is ignored, so that the write fails.
-    for line in ["simulate --protocol paper --out bench --force", "demo --paper --out new"] {
+    for line in ["simulate --protocol paper --out bench --force", "simulate --protocol pulses --out new"] {
         let script = format!("trap '' XFSZ; ulimit -f 8; exec \"$0\" {line}");
         let output = Command::new("bash")
             .current_dir(scratch.path(""))

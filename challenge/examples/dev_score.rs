@@ -122,7 +122,7 @@ fn main() -> anyhow::Result<()> {
         verdicts.push(verdict);
     }
     if wanted.is_empty() {
-        println!("{}", Score::of(&truth, &verdicts)?);
+        println!("{}", serde_json::to_string_pretty(&Score::of(&truth, &verdicts)?)?);
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! Every family of forms judged by a diagnosis that was calibrated without it:
 //! `cargo run --release -p stretch-challenge --example leave_family_out -- FOLDER`.
 //!
-//! FOLDER holds cases of several families (`challenge make --family all`) that were diagnosed once
+//! FOLDER holds cases of several families (`challenge make`) that were diagnosed once
 //! (`challenge run`). For each family temperature and borders are calibrated on the answers of the
 //! others, and its own cases are diagnosed again with them.
 
@@ -38,7 +38,7 @@ fn main() -> anyhow::Result<()> {
             own.par_iter().map(|(name, label)| answer(folder, name, label, &options)).collect();
         judged.extend(verdicts?);
     }
-    println!("{}", Score::of(&truth, &judged)?);
+    println!("{}", serde_json::to_string_pretty(&Score::of(&truth, &judged)?)?);
     Ok(())
 }
 

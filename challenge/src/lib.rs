@@ -17,4 +17,4 @@ pub use run::{
     Asked, RunOptions, diagnosed, is_stopped, on_ctrl_c, run_cases, shared_out, write_diagnosis,
 };
 pub use score::{ANSWER, score_answers};
-pub use text::{aligned, progress, say};
+pub use text::{progress, say};

@@ -3,10 +3,10 @@
 use std::{path::PathBuf, process::ExitCode};
 
 use clap::Parser;
-use stretch_blind::{Disturbances, Family, Plan, PlantName, Protocol};
+use stretch_blind::{Family, Plan, PlantName};
 use stretch_challenge::{
-    Asked, RunOptions, aligned, board, is_stopped, make_cases, make_open, on_ctrl_c, run_cases,
-    say, score_answers, score_open, write_diagnosis,
+    Asked, RunOptions, board, is_stopped, make_cases, make_open, on_ctrl_c, run_cases, say,
+    score_answers, score_open, write_diagnosis,
 };
 
 /// Check the diagnosis on cases whose causes are sealed until it has answered
@@ -61,9 +61,6 @@ enum Step {
         /// Score the first N cases of a set alone, for a submission that was not finished
         #[arg(long, value_name = "N")]
         first: Option<usize>,
-        /// Leave out the fits that know the labels
-        #[arg(long)]
-        no_oracle: bool,
     },
     /// Write the leaderboard of scores
     Board {
@@ -92,23 +89,14 @@ struct Make {
     /// Folder that the cases go to; it must not hold anything
     #[arg(long, value_name = "DIR", default_value = "challenge-check")]
     out: PathBuf,
-    /// Family that the forms are drawn from: written, splines, spectra, rate_laws, asymmetric, or
-    /// all of them in turn
-    #[arg(long, value_name = "NAME|all", default_value = "all", value_parser = family)]
-    family: Families,
-    /// Supply, noise, clock and pauses: plain is the same for every rig, drawn another for each
-    #[arg(long, alias = "clutter", value_name = "plain|drawn", default_value = "drawn")]
-    disturbances: Disturbances,
-    /// Trials of a session: paper, or paper+ with one more at 0.7 of the excitation
-    #[arg(long, value_name = "paper|paper+", default_value = "paper")]
-    protocol: Protocol,
+    /// Family that the forms are drawn from: written, splines, spectra, rate_laws or asymmetric
+    /// [default: all of them in turn]
+    #[arg(long, value_name = "NAME")]
+    family: Option<Family>,
     /// Make a set that strangers solve, of this plant: rig, servo or thermal; its labels go to
     /// DIR-sealed
     #[arg(long, value_name = "NAME")]
     plant: Option<PlantName>,
-    /// Keep the labels of a set apart from it, in DIR-sealed; a set always does
-    #[arg(long, requires = "plant")]
-    seal: bool,
     /// Family of forms and noise in addition to the published ones, a JSON file that is kept back
     #[arg(long, value_name = "FILE.json", requires = "plant")]
     private: Option<PathBuf>,
@@ -128,16 +116,6 @@ fn count(text: &str) -> Result<usize, String> {
     cases.ok_or_else(|| format!("\"{text}\" is not a number of cases up to {MOST_CASES}"))
 }
 
-/// One family, or all in turn: an alias, because an option of clap that is an `Option` has no default.
-type Families = Option<Family>;
-
-fn family(name: &str) -> Result<Families, String> {
-    if name == "all" {
-        return Ok(None);
-    }
-    name.parse().map(Some).map_err(|known: String| format!("{known}, all"))
-}
-
 fn main() -> ExitCode {
     // without a handler Ctrl-C still ends the program; only the cleaning up is lost
     let _ = ctrlc::set_handler(on_ctrl_c);
@@ -155,11 +133,11 @@ fn run(args: Args) -> anyhow::Result<()> {
     match (args.step, args.make) {
         (Some(Step::Make(make)), _) => made(&make),
         (Some(Step::Run { folder, options }), _) => answered(&folder, &options),
-        (Some(Step::Score { folder, set, spent, first, .. }), _) if folder.is_file() => {
-            say(aligned(&score_open(&folder, &set, &spent, first)?));
+        (Some(Step::Score { folder, set, spent, first }), _) if folder.is_file() => {
+            say(score_open(&folder, &set, &spent, first)?);
             Ok(())
         }
-        (Some(Step::Score { folder, no_oracle, .. }), _) => scored(&folder, !no_oracle),
+        (Some(Step::Score { folder, .. }), _) => scored(&folder),
         (Some(Step::Board { scores, out }), _) => {
             let page = board(&scores)?;
             stretch_data::files::write_whole(&out, |file| file.write_all(page.as_bytes()))?;
@@ -170,7 +148,7 @@ fn run(args: Args) -> anyhow::Result<()> {
         (None, Some(make)) => {
             made(&make)?;
             answered(&make.out, &args.options)?;
-            scored(&make.out, true)
+            scored(&make.out)
         }
         (None, None) => anyhow::bail!("say how many cases: challenge --cases 100"),
     }
@@ -184,8 +162,7 @@ fn made(make: &Make) -> anyhow::Result<()> {
         say(format!("made {cases} cases in {out}; labels sealed in {out}-sealed, SHA-256 {hash}"));
         return Ok(());
     }
-    let Make { family, disturbances, protocol, .. } = *make;
-    let plan = Plan { family, disturbances, protocol, ..Plan::of(make.cases) };
+    let plan = Plan { family: make.family, ..Plan::of(make.cases) };
     let sha256 = make_cases(&make.out, make.seed, &plan)?;
     let (cases, out) = (make.cases, make.out.display());
     say(format!("made {cases} cases in {out}; labels sealed, SHA-256 {sha256}"));
@@ -198,8 +175,8 @@ fn answered(folder: &std::path::Path, options: &RunOptions) -> anyhow::Result<()
     Ok(())
 }
 
-fn scored(folder: &std::path::Path, with_oracle: bool) -> anyhow::Result<()> {
-    say(aligned(&score_answers(folder, with_oracle)?));
+fn scored(folder: &std::path::Path) -> anyhow::Result<()> {
+    say(score_answers(folder)?);
     say(format!("wrote {}", folder.join("report.html").display()));
     Ok(())
 }

@@ -1,9 +1,7 @@
-//! Submissions to sets that strangers solve: their scores, and the leaderboard, a page of one file whose table is
-//! sorted by a click on a column.
+//! Submissions to sets that strangers solve: their scores, and the leaderboard, a page of one file.
 
 use std::{
     collections::BTreeMap,
-    fmt::Write as _,
     fs,
     path::{Path, PathBuf},
 };
@@ -12,9 +10,9 @@ use anyhow::{Context, ensure};
 use serde::de::DeserializeOwned;
 use stretch_blind::{Figures, Interval, OpenScore, OpenTruth, Outcome, Submission};
 use stretch_data::files::write_whole;
-use stretch_report::kit::escape;
+use stretch_report::kit::{Figure, Page, Table};
 
-use crate::make::record_spent;
+use crate::{make::record_spent, page::reliability_figure, text::table};
 
 /// Scores a submission against the set next to whose labels it was made, writes
 /// `SUBMISSION.score.json`, and records the seed. `first` limits the set and the submission to that
@@ -44,15 +42,9 @@ pub fn score_open(
     write_whole(&path, |out| out.write_all(json.as_bytes()))?;
     record_spent(spent, &score)?;
     let rows = Figures::of(&score.outcomes).rows;
-    let rows: String =
-        rows.iter().map(|(name, figure)| format!("| {name} | {} |\n", cell(figure))).collect();
-    Ok(format!(
-        "seal intact, SHA-256 {hash}\n\n| {} on {} | reached, 95 % interval, cases |\n| --- | --- |\n{}wrote {}",
-        score.method,
-        score.plant,
-        rows,
-        path.display()
-    ))
+    let head = [&*format!("{} on {}", score.method, score.plant), "reached, 95 % interval, cases"];
+    let rows = table(head, rows.into_iter().map(|(name, figure)| [name, cell(&figure)]));
+    Ok(format!("seal intact, SHA-256 {hash}\n\n{rows}\nwrote {}", path.display()))
 }
 
 /// A figure with its interval, or a dash where no case counts.
@@ -69,6 +61,7 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
 }
 
 /// The page of scores: a row for each method and plant, a row for each method over all its plants, and reliability diagrams.
+/// Rows of a plant are in the order of the exact answers.
 ///
 /// Methods over several plants are compared only if each was asked the same cases; the page states
 /// the sets of each row.
@@ -90,85 +83,40 @@ pub fn board(paths: &[PathBuf]) -> anyhow::Result<String> {
             row.extend(score.outcomes.iter().cloned());
         }
     }
-    let figures: Vec<(String, String, usize, Figures)> = rows
+    let mut figures: Vec<(String, String, Figures)> = rows
         .into_iter()
-        .map(|((plant, method), cases)| (plant, method, cases.len(), Figures::of(&cases)))
+        .map(|((plant, method), cases)| (plant, method, Figures::of(&cases)))
         .collect();
-    let mut table = String::from("<tr><th>plant</th><th>method</th><th>cases</th>");
-    for (name, _) in &figures[0].3.rows {
-        let _ = write!(table, "<th>{name}</th>");
-    }
-    table.push_str("</tr></thead><tbody>\n");
-    for (plant, method, cases, figures) in &figures {
-        let _ = write!(
-            table,
-            "<tr><td>{plant}</td><td>{}</td><td data-v={cases}>{cases}</td>",
-            escape(method)
-        );
-        for (_, figure) in &figures.rows {
-            let key = figure.value.map_or(String::new(), |v| v.to_string());
-            let _ = write!(table, "<td data-v=\"{key}\">{}</td>", cell(figure));
-        }
-        table.push_str("</tr>\n");
-    }
-    let diagrams: String = figures
-        .iter()
-        .filter(|(plant, ..)| plant == "all")
-        .map(|(_, method, cases, figures)| diagram(method, *cases, figures))
+    // the first figure is the share of exact answers
+    let exact = |figures: &Figures| figures.rows[0].1.value.unwrap_or(0.0);
+    figures.sort_by(|a, b| a.0.cmp(&b.0).then(exact(&b.2).total_cmp(&exact(&a.2))));
+    let mut page = Page::new(
+        "What is missing from the simulator?",
+        "Each cell: value, 95\u{a0}% interval by bootstrap over cases, cases that count.",
+    );
+    let names = figures[0].2.rows.iter().map(|(name, _)| name.as_str());
+    let head: Vec<&str> = ["plant", "method"].into_iter().chain(names).collect();
+    let row = |(plant, method, figures): &(String, String, Figures)| {
+        let cells = figures.rows.iter().map(|(_, figure)| cell(figure));
+        [plant.clone(), method.clone()].into_iter().chain(cells).collect()
+    };
+    page.table(&Table::new("Figures by plant and method", &head, figures.iter().map(row)));
+    page.section("Reliability", "");
+    let whole = figures.iter().filter(|(plant, ..)| plant == "all");
+    let diagrams: Vec<(Figure, String)> = whole
+        .map(|(_, method, figures)| (reliability_figure(&figures.reliability), method.clone()))
         .collect();
-    let setups: BTreeMap<&str, &str> =
-        scores.iter().map(|s| (s.method.as_str(), s.setup.as_str())).collect();
-    let setups: String = setups
-        .iter()
-        .map(|(method, setup)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(method), escape(setup)))
-        .collect();
-    let sets: BTreeMap<&str, String> = scores
-        .iter()
-        .map(|s| {
-            (s.set.as_str(), format!("{}, seed {}, {} cases", s.plant, s.seed, s.outcomes.len()))
-        })
-        .collect();
-    let sets: String = sets
-        .iter()
-        .map(|(hash, what)| format!("<li>{}: <code>{hash}</code></li>\n", escape(what)))
-        .collect();
-    Ok(format!(
-        "{HEAD}{table}{MIDDLE}{diagrams}<h2>Set up</h2><dl>\n{setups}</dl><h2>Sets</h2><ul>\n{sets}</ul>{TAIL}"
-    ))
-}
-
-const HEAD: &str = r#"<!doctype html><html lang="en"><meta charset="utf-8"><title>Challenge: leaderboard</title>
-<style>body{font:15px/1.5 system-ui,sans-serif;margin:2em}table{border-collapse:collapse;font-size:13px}
-th,td{padding:.3em .6em;border-bottom:1px solid #ccc;text-align:right;white-space:nowrap}th{cursor:pointer}
-th:nth-child(-n+2),td:nth-child(-n+2){text-align:left}figure{display:inline-block;margin:.5em}div{overflow-x:auto}</style>
-<h1>What is missing from the simulator?</h1><p>Each cell: value, 95 % interval by bootstrap over cases, cases that count.
-A click on a column sorts by it, a second click the other way round.</p><div><table><thead>"#;
-
-const MIDDLE: &str = "</tbody></table></div><h2>Reliability</h2><p>Across: the greatest probability of an answer. Up: how often it was \
-right. The area of a dot is the number of cases.</p>";
-
-const TAIL: &str = r#"<script>document.querySelectorAll("th").forEach((th,i)=>th.onclick=()=>{const b=document.querySelector("tbody"),
-d=th.dataset.d=-(th.dataset.d||1),k=r=>r.children[i].dataset.v??r.children[i].textContent;
-[...b.rows].sort((x,y)=>{const[p,q]=[k(x),k(y)];if(p===""||q==="")return(p==="")-(q==="");
-return d*(isNaN(p)||isNaN(q)?q.localeCompare(p):q-p)}).forEach(r=>b.append(r))})</script></html>
-"#;
-
-/// A square of 200 points with the diagonal and a dot for each tenth.
-fn diagram(method: &str, cases: usize, figures: &Figures) -> String {
-    let mut dots = String::new();
-    for bin in &figures.reliability.bins {
-        let Some(right) = bin.right.share() else { continue };
-        let n = bin.right.cases;
-        let radius = 2.0 + 14.0 * (n as f64 / cases as f64).sqrt();
-        let (x, y) = (20.0 + 160.0 * bin.stated, 180.0 - 160.0 * right);
-        let _ = write!(
-            dots,
-            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\" fill=\"#36c\" fill-opacity=\".6\"><title>{n} cases</title></circle>"
-        );
-    }
-    let name = escape(method);
-    format!(
-        "<figure><svg width=\"200\" height=\"200\" role=\"img\" aria-label=\"reliability of {name}\"><rect x=\"20\" y=\"20\" width=\"160\" \
-         height=\"160\" fill=\"none\" stroke=\"#999\"/><path d=\"M20 180L180 20\" stroke=\"#999\"/>{dots}</svg><figcaption>{name}</figcaption></figure>\n"
-    )
+    page.figures(&diagrams);
+    page.section("Set up", "");
+    let setups: BTreeMap<&str, &String> =
+        scores.iter().map(|s| (s.method.as_str(), &s.setup)).collect();
+    page.facts(&setups.into_iter().map(|(method, s)| (method, s.clone())).collect::<Vec<_>>());
+    page.section("Sets", "");
+    let set = |s: &OpenScore| {
+        let OpenScore { plant, seed, set, outcomes, .. } = s;
+        (set.clone(), format!("{plant}, seed {seed}, {} cases: {set}", outcomes.len()))
+    };
+    let sets: BTreeMap<String, String> = scores.iter().map(set).collect();
+    page.list(&sets.into_values().collect::<Vec<_>>());
+    Ok(page.finish())
 }

@@ -5,13 +5,13 @@ use plotters::{
     prelude::*,
     style::text_anchor::{HPos, VPos},
 };
-use stretch_blind::{
-    Baseline, COUNTED_EXCESS, Calibration, CaseKind, Label, Miss, Rate, Score, Verdict,
+use stretch_blind::{Baseline, Calibration, CaseKind, Miss, Rate, Score};
+use stretch_report::{
+    kit::{
+        Axes, Bar, Figure, FigureSize, Ink, Page, Row, Scale, Table, bar_figure, dot, number,
+        percent, plot, px, stroke, words,
+    },
     method_in_words,
-};
-use stretch_report::kit::{
-    Axes, Bar, Figure, FigureSize, Ink, Page, Row, Scale, Table, bar_figure, dot, fixed,
-    narrow_bar_figure, number, percent, plot, px, stroke, words,
 };
 
 use crate::{goals::Goal, score::Answers};
@@ -26,8 +26,7 @@ pub(crate) fn page(score: &Score, answers: &Answers, reached: &[Goal]) -> String
     goals(&mut page, &answers.sha256, reached);
     methods(&mut page, score);
     strength(&mut page, score, answers);
-    sets(&mut page, score, answers);
-    confusion(&mut page, score);
+    probabilities(&mut page, score);
     misses(&mut page, score);
     page.finish()
 }
@@ -80,41 +79,30 @@ fn methods(page: &mut Page, score: &Score) {
         top1_above_10: score.singles.top1_above_10,
         false_names: score.false_names,
     };
-    let all = || {
-        let theirs = score.baselines.iter().map(|(name, b)| (method_in_words(name), b, Ink::First));
-        std::iter::once(("this diagnosis", &ours, Ink::Third)).chain(theirs)
-    };
-    let right: Vec<Row> = all().map(|(name, b, ink)| rate_row(name, &b.top1, ink)).collect();
-    let wrong: Vec<Row> = all().map(|(name, b, ink)| rate_row(name, &b.false_names, ink)).collect();
-    page.figures(&[
-        (
-            narrow_bar_figure("First name right, by method", &right, Scale::Percent, "%"),
-            "Share of the simulators with one missing effect in which the effect named first is the missing one. Counted are gaps with an excess of 0.1 or more.".to_owned(),
-        ),
-        (
-            narrow_bar_figure("Nulls on which an effect is named", &wrong, Scale::Percent, "%"),
-            "Simulators without a fault for which an effect is named all the same.".to_owned(),
-        ),
-    ]);
+    let theirs = score.baselines.iter().map(|(name, b)| (method_in_words(name), b));
+    let all = std::iter::once(("this diagnosis", &ours)).chain(theirs);
     let cell = |rate: &Rate| match rate.share() {
         Some(share) => format!("{} ({} of {})", percent(share), rate.hits, rate.cases),
         None => "no case".to_owned(),
     };
-    let rows = all().map(|(name, b, _)| {
+    let rows = all.map(|(name, b)| {
         vec![name.to_owned(), cell(&b.top1), cell(&b.top1_above_10), cell(&b.false_names)]
     });
     let head = ["Method", "First name right", "Above an excess of 10", "Names something on nulls"];
     page.table(&Table::new("The same cases, by method", &head, rows).highlight(0));
 }
 
-fn rate_row(label: &str, rate: &Rate, ink: Ink) -> Row {
+fn rate_row(label: &str, rate: &Rate) -> Row {
     let share = rate.share().unwrap_or(0.0);
     let text = match rate.share() {
         Some(share) => format!("{} of {}", percent(share), rate.cases),
         None => "no case".to_owned(),
     };
     let interval = rate.wilson().map(|(a, b)| [a, b]);
-    Row { label: label.to_owned(), bars: vec![Bar { interval, text, ..Bar::new(ink, share) }] }
+    Row {
+        label: label.to_owned(),
+        bars: vec![Bar { interval, text, ..Bar::new(Ink::Third, share) }],
+    }
 }
 
 fn strength(page: &mut Page, score: &Score, answers: &Answers) {
@@ -138,59 +126,38 @@ fn strength(page: &mut Page, score: &Score, answers: &Answers) {
         .iter()
         .enumerate()
         .filter(|(_, r)| r.cases > 0)
-        .map(|(i, r)| rate_row(&label(i), r, Ink::Third))
+        .map(|(i, r)| rate_row(&label(i), r))
         .collect();
     page.figure(
         &bar_figure("First name right, by strength", &rows, Scale::Percent, "%"),
         "Share of the simulators with one missing effect in which the effect named first is the missing one, by the excess that the effect causes, with Wilson's 95 % interval.",
     );
-    let by_effect = score.by_effect.iter().map(|(name, rate)| rate_row(name, rate, Ink::Third));
+    let by_effect = score.by_effect.iter().map(|(name, rate)| rate_row(name, rate));
     let by_effect: Vec<Row> = by_effect.collect();
-    page.folded("By effect", |page| {
+    let by_family = score.by_family.iter().map(|(name, rate)| rate_row(name.name(), rate));
+    let by_family: Vec<Row> = by_family.collect();
+    page.folded("By effect and by family of forms", |page| {
         page.figure(
             &bar_figure("First name right, by effect", &by_effect, Scale::Percent, "%"),
             "First name right at an excess of 0.1 or more.",
         );
+        page.figure(
+            &bar_figure("Exactly the one effect named, by family", &by_family, Scale::Percent, "%"),
+            "Exactly the one effect named at an excess of 0.1 or more, by the family of its form.",
+        );
     });
 }
 
-fn sets(page: &mut Page, score: &Score, answers: &Answers) {
+fn probabilities(page: &mut Page, score: &Score) {
     page.section("Are the probabilities honest?", "");
-    let labels = &answers.truth.cases;
-    let labelled = answers.verdicts.iter().filter_map(|v| Some((v, labels.get(&v.case)?)));
-    let counted: Vec<(&Verdict, &Label)> = labelled
-        .filter(|(_, l)| l.kind == CaseKind::Single && l.excess >= COUNTED_EXCESS)
-        .collect();
-    let of_size = |(size, name): (usize, &str)| {
-        let here = counted.iter().filter(|(v, _)| v.ambiguous.len().min(4) == size);
-        let cases = here.clone().count();
-        let right = here.filter(|(v, l)| l.effects.iter().all(|e| v.ambiguous.contains(e))).count();
-        let text = format!("{cases}, {right} right");
-        let bar = Bar { text, ..Bar::new(Ink::Third, cases as f64 / counted.len() as f64) };
-        (cases > 0).then(|| Row { label: name.to_owned(), bars: vec![bar] })
-    };
-    let names = ["no name", "1 name", "2 names", "3 names", "4 or more names"];
-    let sizes: Vec<Row> = names.into_iter().enumerate().filter_map(of_size).collect();
-    page.figures(&[
-        (
-            reliability_figure(&score.calibration),
-            format!(
-                "Probability stated against how often it came true; expected calibration error {}.",
-                score.calibration.ece.map_or_else(|| "unknown".to_owned(), |e| fixed(e, 3))
-            ),
-        ),
-        (
-            narrow_bar_figure("Sizes of the 95 % sets", &sizes, Scale::Percent, "% of cases"),
-            format!(
-                "Sizes of the 95 % sets and how many hold the true effect; mean size {}.",
-                score.singles.set_size.map_or_else(|| "unknown".to_owned(), |s| fixed(s, 2))
-            ),
-        ),
-    ]);
+    page.figure(
+        &reliability_figure(&score.calibration),
+        "Probability stated against how often it came true.",
+    );
 }
 
 /// Stated probability against how often it came true, with Wilson's interval.
-fn reliability_figure(calibration: &Calibration) -> Figure {
+pub(crate) fn reliability_figure(calibration: &Calibration) -> Figure {
     let bins: Vec<_> = calibration.bins.iter().filter(|b| b.right.cases > 0).collect();
     if bins.is_empty() {
         return Figure::missing("No probability was stated.");
@@ -225,24 +192,6 @@ fn reliability_figure(calibration: &Calibration) -> Figure {
             })
         },
     )
-}
-
-fn confusion(page: &mut Page, score: &Score) {
-    page.section("What was said for what", "");
-    let is_right = |truth: &str, said: &str| {
-        said == truth || truth == "null" && ["no_gap", "parameters"].contains(&said)
-    };
-    let rows = score.confusion.iter().map(|(truth, counts)| {
-        let (right, wrong): (Vec<_>, Vec<_>) =
-            counts.iter().partition(|(said, _)| is_right(truth, said));
-        let right: usize = right.iter().map(|(_, n)| **n).sum();
-        let wrong: Vec<String> =
-            wrong.iter().map(|(said, n)| format!("{n} \u{d7} {said}")).collect();
-        let cases: usize = counts.values().sum();
-        vec![truth.clone(), cases.to_string(), right.to_string(), wrong.join(", ")]
-    });
-    let head = ["There", "Cases", "Right", "First name given, or verdict, in the others"];
-    page.table(&Table::new("Single effects and nulls", &head, rows));
 }
 
 fn misses(page: &mut Page, score: &Score) {

@@ -1,21 +1,18 @@
-//! Opens the seal: compares answers with labels and goals, and fits that know the labels.
+//! Opens the seal: compares answers with labels and goals.
 
 use std::{
-    fmt::Write as _,
     fs,
     path::{Path, PathBuf},
 };
 
 use anyhow::{Context, ensure};
-use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, Score, Truth, Verdict};
+use stretch_blind::{Score, Truth, Verdict};
 use stretch_data::files::Outputs;
-use stretch_gap::{Options, threads};
 
 use crate::{
     goals::{Goal, goals},
     page::page,
-    run::{diagnosed, shared_out},
-    text::progress,
+    text::table,
 };
 
 /// The answer in a case's folder.
@@ -70,19 +67,13 @@ pub(crate) fn case_folders(folder: &Path) -> anyhow::Result<Vec<(String, PathBuf
     Ok(cases)
 }
 
-/// Scores the answers of a folder, writes `score.json` and `report.html` into it, and returns the
-/// score as text.
-///
-/// `with_oracle` fits every counted single effect with a catalogue of only that effect: what it
-/// closes is the upper limit.
+/// Scores the answers of a folder, writes `score.json` and `report.html` into it, and returns a
+/// table of the goals.
 ///
 /// # Errors
-/// A broken seal, invalid answers, a file that cannot be written, Ctrl-C.
-pub fn score_answers(folder: &Path, with_oracle: bool) -> anyhow::Result<String> {
-    let mut answers = Answers::read(folder)?;
-    if with_oracle {
-        oracle(folder, &mut answers)?;
-    }
+/// A broken seal, invalid answers, a file that cannot be written.
+pub fn score_answers(folder: &Path) -> anyhow::Result<String> {
+    let answers = Answers::read(folder)?;
     let score = Score::of(&answers.truth, &answers.verdicts)?;
     let goals = goals(&score);
     let json = serde_json::json!({ "score": score, "goals": goals });
@@ -98,43 +89,11 @@ pub fn score_answers(folder: &Path, with_oracle: bool) -> anyhow::Result<String>
 }
 
 fn text(score: &Score, goals: &[Goal], sha256: &str) -> String {
-    let mut text = format!("seal intact, SHA-256 {sha256}\n\n");
-    text.push_str("| goal | asked | reached | count | 95 % interval | met |\n");
-    text.push_str("| --- | --- | --- | --- | --- | --- |\n");
-    for goal in goals {
-        // a string takes every write
-        let _ = writeln!(text, "| {} |", goal.cells().join(" | "));
-    }
-    text + "too few: a single case decides.\n\n" + &score.to_string()
-}
-
-/// Adds to every counted single effect what a fit closes whose catalogue holds only the true
-/// effect.
-fn oracle(folder: &Path, answers: &mut Answers) -> anyhow::Result<()> {
-    let is_counted =
-        |label: &&Label| label.kind == CaseKind::Single && label.excess >= COUNTED_EXCESS;
-    let label = |case: &String| answers.truth.cases.get(case).filter(is_counted);
-    let verdicts = answers.verdicts.iter().enumerate();
-    let wanted: Vec<(usize, &Label)> =
-        verdicts.filter_map(|(i, v)| Some((i, label(&v.case)?))).collect();
-    let progress = progress("fits that know the label", wanted.len());
-    let found = shared_out(threads(0), wanted.len(), |at| {
-        let (i, label) = wanted[at];
-        let closed = closed_by(&folder.join(&answers.verdicts[i].case), &label.effects);
-        progress.inc(1);
-        Ok((i, closed))
-    })?;
-    for (i, closed) in found {
-        answers.verdicts[i].closed_oracle = closed;
-    }
-    Ok(())
-}
-
-/// The share of the gap that these effects close if the catalogue has no other.
-fn closed_by(case: &Path, effects: &[String]) -> Option<f64> {
-    let names = stretch_sim::CATALOGUE.iter().map(|e| e.name);
-    let without: Vec<&str> = names.filter(|name| effects.iter().all(|e| e != name)).collect();
-    let options = Options { threads: 1, ..Options::default() };
-    let (diagnosis, _) = diagnosed(case, &without, &options, &|_| ()).ok()?;
-    diagnosis.candidates.first().map(|c| c.closed)
+    let head = ["goal", "asked", "reached", "count", "95 % interval", "met"];
+    let goals = table(head, goals.iter().map(Goal::cells));
+    format!(
+        "seal intact, SHA-256 {sha256}\n\n{goals}\ntoo few: a single case decides.\n\n{} wrong of {}.",
+        score.misses.len(),
+        score.cases
+    )
 }

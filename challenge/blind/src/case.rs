@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::disturbances::{Disturbances, Surroundings};
+use crate::disturbances::Surroundings;
 use crate::effect::{Cause, Causes, Family, Kind};
 use crate::error::BlindError;
 use crate::excess::Yardstick;
@@ -54,14 +54,9 @@ impl Case {
         let mut effect_random = RandomGenerator::new(seed, base + 2);
         let mut noise_random = RandomGenerator::new(seed, base + 3);
         let mut disturbances_random = RandomGenerator::new(seed, base + 4);
-        let mut scripts = session(plan.protocol, &mut protocol_random);
-        let around = match plan.disturbances {
-            Disturbances::Plain => Surroundings::plain(),
-            Disturbances::Drawn => Surroundings::draw(&mut disturbances_random),
-        };
-        if let Some(drawn) = around.drawn {
-            scripts = with_pauses(scripts, || drawn.pause(&mut disturbances_random));
-        }
+        let around = Surroundings::draw(&mut disturbances_random);
+        let scripts = session(&mut protocol_random);
+        let scripts = with_pauses(scripts, || around.pause(&mut disturbances_random));
         for _ in 0..TRIES {
             let rig = Rig::draw(&mut rig_random);
             let conditions = Conditions::draw(&scripts, &around, &mut rig_random);
@@ -109,7 +104,7 @@ fn record(
     let length = noisy(&trace.length, l.samples(count, random));
     let volts = noisy(&trace.volts, v.samples(count, random));
     let shown = |v: f64| (v.clamp(0.0, V_FS) / V_STEP).round() * V_STEP;
-    let stamped = around.drawn.is_some_and(|d| d.stamped) && !offsets.is_empty();
+    let stamped = around.stamped && !offsets.is_empty();
     let stamp = |(i, late): (usize, &f64)| i as f64 / RATE_HZ as f64 + late;
     Recording {
         script: script.clone(),
@@ -117,7 +112,7 @@ fn record(
         length_mm: length.iter().map(|l| (l / L_STEP).round() * L_STEP).collect(),
         bridge_v: volts.into_iter().map(shown).collect(),
         stamps: stamped.then(|| offsets.iter().enumerate().map(stamp).collect()),
-        missing: around.drawn.map_or_else(Vec::new, |d| d.missing(count, random)),
+        missing: around.missing(count, random),
     }
 }
 
@@ -273,15 +268,14 @@ fn tuned(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::protocol::Protocol;
     use crate::truth::TWINS;
 
     #[test]
     fn strengths_span_the_range_wanted_for_every_effect() {
-        let scripts = session(Protocol::Paper, &mut RandomGenerator::new(2, 1));
+        let scripts = session(&mut RandomGenerator::new(2, 1));
         let mut random = RandomGenerator::new(2, 2);
         let rig = Rig::draw(&mut random);
-        let around = Surroundings::plain();
+        let around = Surroundings::draw(&mut random);
         let conditions = Conditions::draw(&scripts, &around, &mut random);
         let mut yardstick = Yardstick::new(&rig, &scripts, &conditions, &around, true);
         let kinds = Kind::catalogued().iter().filter(|&&k| k != Kind::ValveDeadband);

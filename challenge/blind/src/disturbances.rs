@@ -1,23 +1,9 @@
-//! Disturbances: everything that is neither the rig nor an effect, fixed or drawn for each rig.
+//! Disturbances: everything that is neither the rig nor an effect, drawn for each rig.
 
 use std::collections::BTreeMap;
 
-use crate::effect::worded;
 use crate::random::RandomGenerator;
 use crate::rig::{SIGMA_L, SIGMA_P, SIGMA_V};
-
-worded! {
-    /// How supply, noise, clock, pauses and start pressures of a case are determined.
-    #[derive(Default)]
-    Disturbances {
-        /// The same in every rig: white Gaussian noise as in the data sheet, a supply that drifts
-        /// by 0.25 % over 15 s, pauses of 15 s, samples on the grid.
-        Plain "plain",
-        /// Drawn for each rig: levels, colours, tails, correlation times, jitter, dropped samples.
-        #[default]
-        Drawn "drawn",
-    }
-}
 
 /// Noise of one channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -142,19 +128,12 @@ impl StartErrors {
 }
 
 /// Everything around a rig, of one case.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Surroundings {
     /// Of pressure in Pa, length in mm, voltage in V.
     pub(crate) noise: [Noise; 3],
     /// Whether a rig file says how much noise there is.
     pub(crate) stated: bool,
-    /// Drawn ones; `None` is as it always was.
-    pub(crate) drawn: Option<Drawn>,
-}
-
-/// What only drawn disturbances have.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Drawn {
     pub(crate) supply: SupplyWander,
     pub(crate) starts: StartErrors,
     /// Mean and spread of the pauses between trials, s.
@@ -168,11 +147,6 @@ pub(crate) struct Drawn {
 }
 
 impl Surroundings {
-    pub(crate) fn plain() -> Self {
-        let noise = [SIGMA_P, SIGMA_L, SIGMA_V].map(Noise::white);
-        Self { noise, stated: false, drawn: None }
-    }
-
     pub(crate) fn draw(random: &mut RandomGenerator) -> Self {
         let stated = random.unit() < 0.5;
         let noise = [SIGMA_P, SIGMA_L, SIGMA_V].map(|sigma| Noise::draw(sigma, random));
@@ -188,7 +162,9 @@ impl Surroundings {
         let jitter_s = if random.unit() < 0.5 { random.log_between(2e-5, 3e-4) } else { 0.0 };
         let stamped = jitter_s > 0.0 && random.unit() < 0.5;
         let dropped = if random.unit() < 0.5 { random.log_between(1e-4, 1e-2) } else { 0.0 };
-        let drawn = Drawn {
+        Self {
+            noise,
+            stated,
             supply,
             starts,
             pause_s: (random.between(9.0, 20.0), random.between(0.0, 4.0)),
@@ -196,27 +172,25 @@ impl Surroundings {
             stamped,
             dropped,
             in_a_row: if random.unit() < 0.5 { 1.0 } else { random.between(1.0, 6.0) },
-        };
-        Self { noise, stated, drawn: Some(drawn) }
+        }
     }
 
-    /// What the label says of it; empty when plain.
+    /// What the label says of it.
     pub(crate) fn facts(&self) -> BTreeMap<String, f64> {
-        let Some(d) = self.drawn else { return BTreeMap::new() };
         let mut facts: BTreeMap<String, f64> = [
             ("noise_stated", f64::from(u8::from(self.stated))),
-            ("supply_sd", d.supply.sd),
-            ("supply_memory_s", d.supply.memory_s),
-            ("supply_order", d.supply.order as f64),
-            ("start_full_mean", d.starts.full.0),
-            ("start_full_sd", d.starts.full.1),
-            ("start_empty_pa", d.starts.empty_pa),
-            ("pause_mean_s", d.pause_s.0),
-            ("pause_spread_s", d.pause_s.1),
-            ("jitter_s", d.jitter_s),
-            ("jitter_stamped", f64::from(u8::from(d.stamped))),
-            ("dropped", d.dropped),
-            ("dropped_in_a_row", d.in_a_row),
+            ("supply_sd", self.supply.sd),
+            ("supply_memory_s", self.supply.memory_s),
+            ("supply_order", self.supply.order as f64),
+            ("start_full_mean", self.starts.full.0),
+            ("start_full_sd", self.starts.full.1),
+            ("start_empty_pa", self.starts.empty_pa),
+            ("pause_mean_s", self.pause_s.0),
+            ("pause_spread_s", self.pause_s.1),
+            ("jitter_s", self.jitter_s),
+            ("jitter_stamped", f64::from(u8::from(self.stamped))),
+            ("dropped", self.dropped),
+            ("dropped_in_a_row", self.in_a_row),
         ]
         .map(|(name, value)| (name.to_owned(), value))
         .into();
@@ -233,9 +207,7 @@ impl Surroundings {
         }
         facts
     }
-}
 
-impl Drawn {
     /// One pause, s.
     pub(crate) fn pause(&self, random: &mut RandomGenerator) -> f64 {
         let (mean, spread) = self.pause_s;
@@ -321,9 +293,9 @@ mod tests {
     #[test]
     fn as_many_rows_are_missing_as_are_said_to_be() {
         let mut random = RandomGenerator::new(7, 3);
-        let mut drawn = Surroundings::draw(&mut random).drawn.expect("drawn");
+        let mut drawn = Surroundings::draw(&mut random);
         for in_a_row in [1.0, 4.0] {
-            drawn = Drawn { dropped: 0.01, in_a_row, ..drawn };
+            drawn = Surroundings { dropped: 0.01, in_a_row, ..drawn };
             let gone = drawn.missing(400_000, &mut random);
             let share = gone.iter().filter(|&&g| g).count() as f64 / 400_000.0;
             assert!(!gone[0]);

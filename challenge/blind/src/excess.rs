@@ -33,7 +33,7 @@ impl<'a> Yardstick<'a> {
         let [sigma_p, sigma_l, sigma_v] = around.noise.map(|noise| noise.sigma);
         let nominal = run(rig, &Causes::default(), scripts, conditions, COARSE);
         let full = rig.static_contraction(rig.p_s() + crate::rig::P_ATM);
-        let slope = (rig.nominal_volts(full) - rig.nominal_volts(0.0)) / (full * L_0);
+        let slope = (rig.volts(full) - rig.volts(0.0)) / (full * L_0);
         // Length noise reaches the voltage of a gauge that is driven by the measured length.
         let volts = sigma_v.powi(2) + V_STEP.powi(2) / 12.0 + (slope * sigma_l).powi(2);
         let noise = [sigma_p, (sigma_l.powi(2) + L_STEP.powi(2) / 12.0).sqrt(), volts.sqrt()];
@@ -102,7 +102,7 @@ impl<'a> Yardstick<'a> {
             t.length[i] - if is_measured { t.shadow[i] } else { n.length[i] }
         });
         let volts = self.join(truth, self.noise[2], |t, _, i| {
-            t.volts[i] - self.rig.volts(1.0 - t.length[i] / L_0, t.excitation)
+            t.volts[i] - self.rig.volts(1.0 - t.length[i] / L_0)
         });
         [pressure, length, volts]
     }
@@ -129,7 +129,7 @@ impl<'a> Yardstick<'a> {
             let scale = 0.25 * self.noise[2];
             let volts = self.join(truth, scale, |t, _, i| {
                 let k = 1.0 - t.length[i] / L_0;
-                rig.volts(k, t.excitation) - self.rig.volts(k, t.excitation)
+                rig.volts(k) - self.rig.volts(k)
             });
             return [zero(), zero(), volts];
         }

@@ -44,8 +44,6 @@ pub(crate) struct Gauge<'a> {
     lowpass: Option<Lags>,
     last_strain: Option<f64>,
     slewed: Option<f64>,
-    /// Share of the nominal excitation.
-    excitation: f64,
 }
 
 impl<'a> Gauge<'a> {
@@ -97,7 +95,6 @@ impl<'a> Gauge<'a> {
             lowpass: find(Kind::AmplifierLowpass).map(|c| Lags::low_pass(&c)),
             last_strain: None,
             slewed: None,
-            excitation: 1.0,
             causes: causes.clone(),
         }
     }
@@ -107,9 +104,8 @@ impl<'a> Gauge<'a> {
         self.active
     }
 
-    /// Excitation on at a share of its nominal value: the amplifier settles, the travel counts on.
-    pub(crate) fn power_up(&mut self, excitation: f64) {
-        self.excitation = excitation;
+    /// Excitation on: the amplifier settles, the travel counts on.
+    pub(crate) fn power_up(&mut self) {
         if let Some(lags) = &mut self.lowpass {
             lags.reset();
         }
@@ -128,11 +124,11 @@ impl<'a> Gauge<'a> {
     /// start.
     pub(crate) fn step(&mut self, now: Instant, t: f64, session: f64, h: f64) -> f64 {
         if !self.active {
-            return self.rig.volts(now.k, self.excitation);
+            return self.rig.volts(now.k);
         }
         let e = self.gauge_strain(now, h);
         let ohm = self.resistance(e, t, session, h);
-        let mut excitation = self.rig.v_exc() * self.excitation;
+        let mut excitation = self.rig.v_exc();
         if let Some(c) = self.causes.find(Kind::CoilDroop) {
             let current = now.openings.0 + now.openings.1;
             excitation *= 1.0 - c.strength * current.sqrt();
@@ -186,8 +182,7 @@ impl<'a> Gauge<'a> {
                 Law::Drawn(law) => law.at(-(-times.max(0.0)).exp_m1()),
                 Law::Written(law) => law(times),
             };
-            // Heat is the square of the excitation.
-            ohm *= 1.0 + strength * warm * self.excitation.powi(2);
+            ohm *= 1.0 + strength * warm;
         }
         if let Some(c) = self.causes.find(Kind::IntermittentContact) {
             let (open, random) = &mut self.contact;
@@ -205,7 +200,7 @@ impl<'a> Gauge<'a> {
         let mut v = volts;
         if let Some(saturation) = &self.saturation {
             let full = self.rig.static_contraction(self.rig.p_s() + P_ATM);
-            v = saturation.clip(v, self.rig.nominal_volts(0.0), self.rig.nominal_volts(full));
+            v = saturation.clip(v, self.rig.volts(0.0), self.rig.volts(full));
         }
         if let Some(c) = self.causes.find(Kind::CapacitivePickup) {
             let (spike, last) = &mut self.pickup;

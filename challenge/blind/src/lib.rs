@@ -19,7 +19,6 @@
 //! let (truth, _) = Truth::open(dir.path())?; // an error if a label was altered
 //! let score = Score::of(&truth, &[verdict])?;
 //! assert_eq!(score.misses.len(), usize::from(truth.cases["case-000"].excess >= 0.1));
-//! println!("{score}");
 //! # Ok(())
 //! # }
 //! ```
@@ -48,11 +47,9 @@ mod score;
 mod seal;
 mod session;
 mod submission;
-mod table;
 mod timing;
 mod truth;
 mod verdict;
-pub use disturbances::Disturbances;
 pub use effect::{Family, Stage};
 pub use error::BlindError;
 pub use make::make;
@@ -60,12 +57,8 @@ pub use plan::Plan;
 pub use plants::{
     Form, FormFamily, Level, OpenLabel, OpenTruth, PlantName, make_set, sealed_beside,
 };
-pub use protocol::{LOW_EXCITATION, Protocol};
 pub use rate::{Bin, Calibration, Rate};
-pub use score::{
-    Baseline, COUNTED_EXCESS, FamilyRow, Miss, STAND_IN, Score, Several, Singles, Struck,
-};
+pub use score::{Baseline, COUNTED_EXCESS, Compounds, Miss, Score, Singles};
 pub use submission::{Answer, Believed, Figures, Interval, OpenScore, Outcome, Said, Submission};
-pub use table::method_in_words;
 pub use truth::{Acting, CaseKind, Label, TWINS, Truth, are_twins};
 pub use verdict::Verdict;

@@ -19,7 +19,7 @@ use crate::truth::Truth;
 /// Makes the cases of a plan under `dir` and seals their labels.
 ///
 /// Writes `case-000/`, `case-001/`, ..., `sealed/truth.json` and `seal.sha256`. Each case is a data
-/// set: `dataset.toml` and seventeen or eighteen trials. There is also `rig.toml` if a rig file
+/// set: `dataset.toml` and seventeen trials. There is also `rig.toml` if a rig file
 /// states the noise, and `hint.toml` with `without = ["name"]` if an entry is removed from the
 /// catalogue. The same seed and plan give the same bytes, whatever the number of threads.
 /// `progress` is called with the number of finished cases, possibly from several threads.
@@ -105,12 +105,10 @@ fn write_case(folder: &Path, name: &str, case: &Case) -> Result<(), BlindError> 
 }
 
 fn csv(recording: &Recording) -> String {
-    let excitation = recording.script.excitation;
     let mut text = String::with_capacity(40 * recording.length_mm.len());
     text.push_str("time_s,inlet,outlet,");
     text.push_str(if recording.pressure_kpa.is_some() { "pressure_kpa," } else { "" });
-    text.push_str("length_mm,bridge_v");
-    text.push_str(if excitation == 1.0 { "\n" } else { ",excitation_share\n" });
+    text.push_str("length_mm,bridge_v\n");
     for (i, (inlet, outlet)) in recording.script.openings.iter().enumerate() {
         if recording.missing.get(i) == Some(&true) {
             continue;
@@ -122,8 +120,7 @@ fn csv(recording: &Recording) -> String {
         if let Some(pressure) = &recording.pressure_kpa {
             let _ = write!(text, "{:.1},", pressure[i]);
         }
-        let _ = write!(text, "{:.3},{:.4}", recording.length_mm[i], recording.bridge_v[i]);
-        let _ = if excitation == 1.0 { writeln!(text) } else { writeln!(text, ",{excitation}") };
+        let _ = writeln!(text, "{:.3},{:.4}", recording.length_mm[i], recording.bridge_v[i]);
     }
     text
 }

@@ -2,13 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::disturbances::Disturbances;
 use crate::effect::{Family, Kind};
-use crate::protocol::Protocol;
 use crate::random::RandomGenerator;
 use crate::truth::CaseKind;
 
-/// Numbers of cases by kind, the range of the strengths, and where forms and disturbances come from.
+/// Numbers of cases by kind, the range of the strengths, and where forms come from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
     /// One effect of the catalogue, every effect in turn.
@@ -27,16 +25,12 @@ pub struct Plan {
     pub excess: (f64, f64),
     /// Family that every form is drawn from; `None` is every family in turn.
     pub family: Option<Family>,
-    /// What disturbs the rigs.
-    pub disturbances: Disturbances,
-    /// Trials of a session.
-    pub protocol: Protocol,
 }
 
 impl Plan {
     /// Divides `cases` into 34 % single, 28 % null, 8 % compound, 6 % dominant, 10 % outside the
-    /// catalogue, and the rest with a removed entry. Excesses are 0.05 to 100; every family of
-    /// forms is used in turn, with random disturbances and the paper's trials.
+    /// catalogue, and the rest with a removed entry. Excesses are 0.05 to 100, and every family of
+    /// forms is used in turn.
     ///
     /// ```
     /// let plan = stretch_blind::Plan::of(360);
@@ -60,21 +54,7 @@ impl Plan {
             struck,
             excess: (0.05, 100.0),
             family: None,
-            disturbances: Disturbances::Drawn,
-            protocol: Protocol::Paper,
         }
-    }
-
-    /// The plan of the hand-written forms alone, with the same disturbances around every rig.
-    ///
-    /// ```
-    /// use stretch_blind::{Disturbances, Family, Plan};
-    /// let plan = Plan::of(20).plain();
-    /// assert_eq!((plan.family, plan.disturbances), (Some(Family::Written), Disturbances::Plain));
-    /// ```
-    #[must_use]
-    pub fn plain(self) -> Self {
-        Self { family: Some(Family::Written), disturbances: Disturbances::Plain, ..self }
     }
 
     /// Cases in all.

@@ -2,29 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::effect::worded;
 use crate::random::RandomGenerator;
 
 /// Samples a second.
 pub(crate) const RATE_HZ: usize = 100;
 /// Pause between trials, s.
 pub(crate) const PAUSE_S: f64 = 15.0;
-
-worded! {
-    /// Which trials a session has.
-    #[derive(Default)]
-    Protocol {
-        /// The seventeen trials of the paper.
-        #[default]
-        Paper "paper",
-        /// One more trial to fit: an arbitrary trial at [`LOW_EXCITATION`] of the excitation, which
-        /// distinguishes a sleeve that goes slack from an amplifier that saturates.
-        PaperPlus "paper+",
-    }
-}
-
-/// Share of the nominal excitation in the further trial of [`Protocol::PaperPlus`].
-pub const LOW_EXCITATION: f64 = 0.7;
 
 /// What a trial may be used for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -44,8 +27,6 @@ pub(crate) struct Script {
     pub(crate) split: Split,
     /// Pause before it, s.
     pub(crate) pause_s: f64,
-    /// Share of the nominal excitation.
-    pub(crate) excitation: f64,
     /// Whether it starts settled at the supply pressure, else at the atmosphere.
     pub(crate) from_full: bool,
     /// Inlet and outlet opening of every sample, 0..1.
@@ -56,11 +37,10 @@ const RAMPS: [(f64, &str); 6] =
     [(0.0025, "0_25"), (0.125, "12_5"), (0.25, "25"), (0.5, "50"), (0.75, "75"), (1.0, "100")];
 
 /// The trials of a session: six inflations, six deflations, then two trials to fit and three to
-/// test; then the protocol's further trials.
-pub(crate) fn session(protocol: Protocol, random: &mut RandomGenerator) -> Vec<Script> {
+/// test.
+pub(crate) fn session(random: &mut RandomGenerator) -> Vec<Script> {
     let mut scripts = Vec::new();
     let mut start_s = 0.0;
-    let (pause_s, excitation) = (PAUSE_S, 1.0);
     let mut add = |file: String, kind, opening, split, from_full, openings: Vec<(f64, f64)>| {
         let duration_s = openings.len() as f64 / RATE_HZ as f64;
         scripts.push(Script {
@@ -69,8 +49,7 @@ pub(crate) fn session(protocol: Protocol, random: &mut RandomGenerator) -> Vec<S
             opening,
             start_s,
             split,
-            pause_s,
-            excitation,
+            pause_s: PAUSE_S,
             from_full,
             openings,
         });
@@ -89,10 +68,6 @@ pub(crate) fn session(protocol: Protocol, random: &mut RandomGenerator) -> Vec<S
     add("arbitrary_2.csv".into(), "arbitrary", None, Split::Test, false, arbitrary(random));
     add("arbitrary_3.csv".into(), "arbitrary", None, Split::Test, false, arbitrary(random));
     add("pulses_2.csv".into(), "pulses", None, Split::Test, false, pulses(random));
-    if protocol == Protocol::PaperPlus {
-        add("arbitrary_low.csv".into(), "arbitrary", None, Split::Fit, false, arbitrary(random));
-        scripts.iter_mut().skip(17).for_each(|script| script.excitation = LOW_EXCITATION);
-    }
     scripts
 }
 
@@ -165,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_session_has_seventeen_trials_and_480_s() {
-        let scripts = session(Protocol::Paper, &mut RandomGenerator::new(1, 1));
+        let scripts = session(&mut RandomGenerator::new(1, 1));
         assert_eq!(scripts.len(), 17);
         assert_eq!(scripts.iter().map(|s| s.openings.len()).sum::<usize>(), 480 * RATE_HZ);
         assert_eq!(scripts.iter().filter(|s| s.split == Split::Test).count(), 3);
@@ -178,13 +153,10 @@ mod tests {
     }
 
     #[test]
-    fn paper_plus_is_the_paper_and_one_trial_more() {
-        let [paper, plus] = Protocol::ALL.map(|p| session(p, &mut RandomGenerator::new(1, 1)));
-        assert_eq!(paper, plus[..17]);
-        let more = &plus[17];
-        assert_eq!((plus.len(), more.split, more.excitation), (18, Split::Fit, LOW_EXCITATION));
-        let spread = with_pauses(plus.clone(), || 20.0);
-        assert_eq!(spread[0], plus[0]);
-        assert_eq!(spread[13].start_s, plus[13].start_s + 13.0 * 5.0);
+    fn longer_pauses_shift_the_starts() {
+        let paper = session(&mut RandomGenerator::new(1, 1));
+        let spread = with_pauses(paper.clone(), || 20.0);
+        assert_eq!(spread[0], paper[0]);
+        assert_eq!(spread[13].start_s, paper[13].start_s + 13.0 * 5.0);
     }
 }

@@ -1,7 +1,6 @@
 //! Counts with their intervals, and the calibration of probabilities.
 
 use serde::{Deserialize, Serialize};
-use statrs::function::beta::inv_beta_reg;
 
 /// `hits` out of `cases`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
@@ -40,33 +39,6 @@ impl Rate {
         let middle = (p + z * z / (2.0 * n)) / scale;
         let half = z / scale * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
         Some(((middle - half).max(0.0), (middle + half).min(1.0)))
-    }
-
-    /// Clopper's and Pearson's exact 95 % interval (1934); `None` without a case.
-    ///
-    /// ```
-    /// let rate = stretch_blind::Rate { hits: 0, cases: 100 };
-    /// let (low, high) = rate.exact().unwrap();
-    /// // 1 - 0.025^(1/100)
-    /// assert!(low == 0.0 && (high - 0.03622).abs() < 1e-5);
-    /// ```
-    #[must_use]
-    pub fn exact(&self) -> Option<(f64, f64)> {
-        let Self { hits, cases } = *self;
-        self.share()?;
-        let (h, n) = (hits as f64, cases as f64);
-        let low = if hits == 0 { 0.0 } else { inv_beta_reg(h, n - h + 1.0, 0.025) };
-        let high = if hits == cases { 1.0 } else { inv_beta_reg(h + 1.0, n - h, 0.975) };
-        Some((low, high))
-    }
-
-    /// As a cell of a table: its share in so many digits, and the counts; `none` without a case.
-    pub(crate) fn cell(&self, digits: usize, none: &str) -> String {
-        let Self { hits, cases } = self;
-        self.share().map_or_else(
-            || none.to_owned(),
-            |share| format!("{share:.digits$} ({hits} of {cases})"),
-        )
     }
 }
 
@@ -114,18 +86,8 @@ impl Calibration {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use approx::{assert_abs_diff_eq, assert_relative_eq};
-    use testkit::tolerance::{F64_ROUNDING, TABLE_DIGITS};
-
-    #[test]
-    fn exact_interval_matches_tables() {
-        // Two of ten: 0.02521 .. 0.55610 (any statistics table of Clopper and Pearson).
-        let (low, high) = Rate { hits: 2, cases: 10 }.exact().expect("cases");
-        assert_abs_diff_eq!(low, 0.025_21, epsilon = TABLE_DIGITS);
-        assert_abs_diff_eq!(high, 0.556_10, epsilon = TABLE_DIGITS);
-        assert_eq!(Rate::default().exact(), None);
-        assert_eq!(Rate { hits: 3, cases: 3 }.exact().expect("cases").1, 1.0);
-    }
+    use approx::assert_relative_eq;
+    use testkit::tolerance::F64_ROUNDING;
 
     #[test]
     fn calibration_error_is_the_weighted_gap() {

@@ -153,13 +153,8 @@ impl Rig {
     }
 
     /// Nominal voltage at a contraction: no effect, no noise, no converter.
-    pub(crate) fn nominal_volts(&self, k: f64) -> f64 {
-        self.volts(k, 1.0)
-    }
-
-    /// The same at a share of the excitation.
-    pub(crate) fn volts(&self, k: f64, excitation: f64) -> f64 {
-        self.bridge(self.r0() * (1.0 + self.strain(k)).powi(2), self.v_exc() * excitation)
+    pub(crate) fn volts(&self, k: f64) -> f64 {
+        self.bridge(self.r0() * (1.0 + self.strain(k)).powi(2), self.v_exc())
     }
 
     /// Flow of ISO 6358 through a conductance `c`, kg/s, from `p1` to `p2` (no flow back).

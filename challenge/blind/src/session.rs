@@ -32,44 +32,18 @@ pub(crate) struct Conditions {
 }
 
 impl Conditions {
-    /// A supply that drifts by 0.25 % (1 sd) over about 15 s. Start pressures are about 0.1 kPa
-    /// above the atmosphere or 0.1 % below the supply.
-    pub(crate) fn plain(scripts: &[Script], random: &mut RandomGenerator) -> Self {
-        let knots = knots(scripts);
-        let (slow_s, smooth_s) = (15.0, 1.5);
-        let mut slow = random.gauss();
-        let mut smooth = slow;
-        let supply = (0..knots)
-            .map(|_| {
-                slow += -slow * KNOT_S / slow_s + (2.0 * KNOT_S / slow_s).sqrt() * random.gauss();
-                smooth += (slow - smooth) * KNOT_S / smooth_s;
-                0.0025 * smooth
-            })
-            .collect();
-        let start_error = scripts.iter().map(|script| {
-            let error = random.gauss().abs();
-            if script.from_full { 0.001 * error } else { 100.0 * error }
-        });
-        Self {
-            supply,
-            start_error: start_error.collect(),
-            offsets: vec![Vec::new(); scripts.len()],
-        }
-    }
-
     /// As the surroundings have it.
     pub(crate) fn draw(
         scripts: &[Script],
         around: &Surroundings,
         random: &mut RandomGenerator,
     ) -> Self {
-        let Some(drawn) = around.drawn else { return Self::plain(scripts, random) };
-        let supply = drawn.supply.knots(knots(scripts), KNOT_S, random);
+        let supply = around.supply.knots(knots(scripts), KNOT_S, random);
         let error = |script: &Script| {
-            if script.from_full { drawn.starts.full(random) } else { drawn.starts.empty(random) }
+            if script.from_full { around.starts.full(random) } else { around.starts.empty(random) }
         };
         let start_error = scripts.iter().map(error).collect();
-        let offsets = scripts.iter().map(|s| drawn.offsets(s.openings.len(), random)).collect();
+        let offsets = scripts.iter().map(|s| around.offsets(s.openings.len(), random)).collect();
         Self { supply, start_error, offsets }
     }
 
@@ -119,8 +93,6 @@ pub(crate) struct Trace {
     pub(crate) shadow: Vec<f64>,
     /// Amplified voltage, V.
     pub(crate) volts: Vec<f64>,
-    /// Share of the nominal excitation.
-    pub(crate) excitation: f64,
     /// Smallest strain of the sleeve.
     pub(crate) least_strain: f64,
 }
@@ -220,11 +192,7 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
             }
             script.openings[((time * RATE_HZ as f64) as usize).min(samples - 1)]
         };
-        let mut trace = Trace {
-            excitation: script.excitation,
-            least_strain: f64::INFINITY,
-            ..Trace::default()
-        };
+        let mut trace = Trace { least_strain: f64::INFINITY, ..Trace::default() };
         let mut path = Vec::with_capacity(samples * fine);
         for step in 0..samples * fine {
             let t = step as f64 * h;
@@ -255,7 +223,7 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
         fine: usize,
     ) -> Vec<f64> {
         let h = 1.0 / (RATE_HZ * fine) as f64;
-        self.gauge.power_up(script.excitation);
+        self.gauge.power_up();
         if let Some(skew) = &mut self.skew {
             skew.begin(trial);
         }
@@ -293,14 +261,14 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
 mod tests {
     use super::*;
     use crate::effect::{Cause, Family, KINDS, Stage};
-    use crate::protocol::{Protocol, session};
+    use crate::protocol::session;
     use approx::assert_abs_diff_eq;
     use testkit::tolerance::{
         BLIND_FILL_PA, BLIND_FULL_PA, BLIND_HYSTERESIS_STATE, BLIND_LENGTH_MM, BLIND_TRIMMED_V,
     };
 
     fn short_session() -> Vec<Script> {
-        let mut scripts = session(Protocol::Paper, &mut RandomGenerator::new(8, 1));
+        let mut scripts = session(&mut RandomGenerator::new(8, 1));
         // One fast inflation, one fast deflation, 20 s of pulses.
         scripts = vec![scripts[5].clone(), scripts[11].clone(), scripts[13].clone()];
         scripts[2].openings.truncate(2000);
@@ -308,6 +276,12 @@ mod tests {
             script.start_s = 40.0 * i as f64;
         }
         scripts
+    }
+
+    /// A steady supply, and starts at its pressure or that of the atmosphere.
+    fn quiet() -> Conditions {
+        let offsets = vec![Vec::new(); 3];
+        Conditions { supply: vec![0.0; 4000], start_error: vec![0.0; 3], offsets }
     }
 
     fn changed(a: &[Trace], b: &[Trace], channel: fn(&Trace) -> &Vec<f64>) -> f64 {
@@ -320,7 +294,7 @@ mod tests {
         let scripts = short_session();
         let mut random = RandomGenerator::new(8, 2);
         let rig = Rig::nominal();
-        let conditions = Conditions::plain(&scripts, &mut random);
+        let conditions = quiet();
         let nominal = run(&rig, &Causes::default(), &scripts, &conditions, COARSE);
         for &kind in KINDS {
             let written = (0..kind.spec().forms.len()).map(|form| (Family::Written, form));
@@ -367,8 +341,7 @@ mod tests {
         let mut random = RandomGenerator::new(8, 6);
         let rig = Rig::nominal();
         // Knees count from the strain and the voltage at the nominal supply.
-        let (supply, offsets) = (vec![0.0; 4000], vec![Vec::new(); 3]);
-        let conditions = Conditions { supply, start_error: vec![0.0; 3], offsets };
+        let conditions = quiet();
         let session =
             |causes: &[Cause]| run(&rig, &Causes::new(causes), &scripts, &conditions, COARSE);
         let nominal = session(&[]);
@@ -402,7 +375,7 @@ mod tests {
     fn a_finer_step_changes_nothing_that_shows() {
         let scripts = short_session();
         let rig = Rig::nominal();
-        let conditions = Conditions::plain(&scripts, &mut RandomGenerator::new(8, 3));
+        let conditions = quiet();
         let fine = run(&rig, &Causes::default(), &scripts, &conditions, FINE);
         let finer = run(&rig, &Causes::default(), &scripts, &conditions, 2 * FINE);
         // 1e-4 of full scale: 62 Pa, 5 um, 0.33 mV.
@@ -415,8 +388,7 @@ mod tests {
     fn the_nominal_rig_behaves_as_its_data_sheet_says() {
         let scripts = short_session();
         let rig = Rig::nominal();
-        let offsets = vec![Vec::new(); 3];
-        let conditions = Conditions { supply: vec![0.0; 4000], start_error: vec![0.0; 3], offsets };
+        let conditions = quiet();
         let traces = run(&rig, &Causes::default(), &scripts, &conditions, FINE);
         let inflation = &traces[0];
         let end = inflation.length.len() - 1;
@@ -438,15 +410,15 @@ mod tests {
     fn memories_have_a_hysteresis_state_before_a_trial_begins() {
         let scripts = short_session();
         let rig = Rig::nominal();
-        let conditions = Conditions::plain(&scripts, &mut RandomGenerator::new(8, 4));
+        let conditions = quiet();
         let random = &mut RandomGenerator::new(8, 5);
         let mut cause = Cause::draw(Kind::SleeveSlip, Family::Written, random);
         cause.form = 0;
         let causes = Causes::new(&[cause.at(0.01)]);
         let traces = run(&rig, &causes, &scripts, &conditions, COARSE);
         // Vented before the first trial: the slack of 0.01 strain is on the side of relaxing.
-        let offset = traces[0].volts[0] - rig.nominal_volts(0.0);
-        let slope = (rig.nominal_volts(0.01) - rig.nominal_volts(0.0)) / 0.01 / (1.0 + rig.e0());
+        let offset = traces[0].volts[0] - rig.volts(0.0);
+        let slope = (rig.volts(0.01) - rig.volts(0.0)) / 0.01 / (1.0 + rig.e0());
         assert_abs_diff_eq!(
             offset,
             0.01 * slope,

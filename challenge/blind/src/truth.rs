@@ -73,7 +73,7 @@ pub struct Label {
     /// Nominal parameters of this rig, SI (V and mm as in rig files).
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, f64>,
-    /// Disturbances of the rig, if they were drawn: levels, times in s, shares. Labels write
+    /// Disturbances of the rig: levels, times in s, shares. Labels write
     /// `clutter`, as in the labels whose hashes are published.
     #[serde(rename = "clutter", alias = "disturbances")]
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]

@@ -32,10 +32,6 @@ pub struct Verdict {
     pub candidates: Vec<(Vec<String>, f64)>,
     /// Stage that the gap was placed in.
     pub stage: Option<String>,
-    /// Closed-gap fraction of the effects named.
-    pub closed: f64,
-    /// Closed-gap fraction of a fit that knows the label, if one was made.
-    pub closed_oracle: Option<f64>,
     /// Seconds the diagnosis took.
     pub runtime_s: f64,
     /// Names given by simpler methods that also ran, by method; `None` if a method named nothing.
@@ -61,7 +57,6 @@ struct Diagnosis {
 struct Candidate {
     effects: Vec<String>,
     probability: f64,
-    closed: Option<f64>,
 }
 
 #[derive(Default, Deserialize)]
@@ -80,8 +75,7 @@ impl Verdict {
     /// Reads a `diagnosis.json`, schema 1, of a case.
     ///
     /// The stage is that of the first named effect if the catalogue knows it, otherwise the one
-    /// with the largest share of the gap. The share closed is that of the named candidate,
-    /// otherwise of the first. `closed_oracle` is left empty.
+    /// with the largest share of the gap.
     ///
     /// # Errors
     /// [`BlindError::Field`] if the verdict, the names, or a probability are missing or out of
@@ -100,7 +94,6 @@ impl Verdict {
         if candidates.iter().any(|c| !(0.0..=1.0 + 1e-9).contains(&c.probability)) {
             return Err(bad("a probability outside 0..1"));
         }
-        let chosen = candidates.iter().find(|c| c.effects == read.named).or(candidates.first());
         let shares = read.location.unwrap_or_default().stages;
         let placed = shares
             .into_iter()
@@ -112,8 +105,6 @@ impl Verdict {
             ambiguous: read.ambiguous,
             tied: read.tied.unwrap_or_default(),
             stage: known.map(|k| k.spec().stage.name().to_owned()).or(placed.map(|s| s.stage)),
-            closed: chosen.and_then(|c| c.closed).unwrap_or(0.0),
-            closed_oracle: None,
             runtime_s: read.runtime_s.unwrap_or(0.0),
             baselines: read.baselines.unwrap_or_default(),
             named: read.named,
@@ -130,13 +121,6 @@ impl Verdict {
     /// The names in a declared tie with those it commits to.
     pub(crate) fn ties(&self) -> &[String] {
         if self.answer().is_empty() { &[] } else { &self.tied }
-    }
-
-    /// Its probability of a cause outside the catalogue; `None` if it states none.
-    #[must_use]
-    pub fn unknown(&self) -> Option<f64> {
-        let alone = |c: &&(Vec<String>, f64)| c.0.len() == 1 && c.0[0] == "unknown";
-        self.candidates.iter().find(alone).map(|c| c.1)
     }
 
     /// Its most likely answer, the names tied with it, and their joint probability.
@@ -172,20 +156,15 @@ mod tests {
         let mut value: Value = serde_json::from_str(text).expect("JSON");
         let verdict = Verdict::from_diagnosis("case-001", &value).expect("a verdict");
         assert_eq!(verdict.stage.as_deref(), Some("pneumatics"));
-        assert_eq!(verdict.closed, 0.96);
         assert_eq!(verdict.baselines["bic"].as_deref(), Some("supply_sag"));
         assert_eq!(verdict.baselines["signature"], None);
         value["verdict"] = "partial".into();
         value["tied"] = serde_json::json!(["supply_sag"]);
-        let unknown = serde_json::json!({ "effects": ["unknown"], "probability": 0.1 });
-        let listed = value["candidates"].as_array_mut().expect("candidates");
-        listed.push(unknown);
         let partial = Verdict::from_diagnosis("case-001", &value).expect("a verdict");
         assert_eq!(
             (partial.answer(), partial.ties()),
             (&["leak".to_owned()][..], &partial.tied[..])
         );
-        assert_eq!((partial.unknown(), verdict.unknown()), (Some(0.1), None));
         value["verdict"] = "record".into();
         assert!(Verdict::from_diagnosis("case-001", &value).expect("read").answer().is_empty());
         value["tied"] = "supply_sag".into();

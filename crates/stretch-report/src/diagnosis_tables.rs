@@ -156,11 +156,13 @@ pub fn transfer_table(transfer: &Transfer) -> Table {
 
 /// A table of the effects that simpler methods named.
 pub fn baseline_table(said: &Baselines) -> Table {
-    let row = |(method, name): (&str, Option<&str>)| {
-        vec![method.to_owned(), name.unwrap_or("nothing").to_owned()]
+    let row = |(key, name): (&str, &Option<String>)| {
+        vec![method_in_words(key).to_owned(), name.as_deref().unwrap_or("nothing").to_owned()]
     };
+    let Baselines { largest_drop, signature, bic } = said;
+    let methods = [("largest_drop", largest_drop), ("signature", signature), ("bic", bic)];
     let caption = "Methods that leave one step out, on the same data";
-    Table::new(caption, &["Method", "Names"], methods(said).map(row))
+    Table::new(caption, &["Method", "Names"], methods.map(row))
 }
 
 /// A table of every slice of a stage; `None` when there are none.
@@ -290,11 +292,12 @@ pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
     })
 }
 
-/// Simpler methods in words, each with the effect that it named.
-fn methods(said: &Baselines) -> [(&'static str, Option<&str>); 3] {
-    [
-        ("largest drop of the error, parameters as shipped", said.largest_drop.as_deref()),
-        ("likeness of a one-step signature", said.signature.as_deref()),
-        ("BIC alone", said.bic.as_deref()),
-    ]
+/// The name of a simpler method, from its key in the JSON of a diagnosis.
+pub fn method_in_words(key: &str) -> &str {
+    match key {
+        "largest_drop" => "largest drop of the error, parameters as shipped",
+        "signature" => "likeness of a one-step signature",
+        "bic" => "BIC alone",
+        other => other,
+    }
 }

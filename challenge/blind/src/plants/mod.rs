@@ -25,7 +25,6 @@ use crate::{
     error::BlindError,
     make::{make, write},
     plan::Plan,
-    protocol::Protocol,
     seal,
     truth::{CaseKind, Truth},
 };
@@ -188,7 +187,6 @@ fn make_rig(set: &Path, cases: usize, seed: u64) -> Result<OpenTruth, BlindError
         dominant: 0,
         struck: 0,
         excess: (0.1, 100.0),
-        protocol: Protocol::Paper,
         ..Plan::of(0)
     };
     make(set, seed, &plan, &|_| ())?;

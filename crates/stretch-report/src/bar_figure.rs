@@ -128,22 +128,9 @@ fn bar_rows(rows: &[Row], picks: &[Option<Pick>], unit: &str) -> Vec<BarRow> {
     rows.iter().enumerate().map(&mut one).collect()
 }
 
-/// Draws a narrow figure whose bars mark their samples in the linked plots.
-pub(crate) fn picking_figure(
-    description: &str,
-    rows: &[Row],
-    picks: &[Option<Pick>],
-    unit: &str,
-) -> Figure {
-    narrow_bar_figure(description, rows, Scale::NoiseMultiples, unit)
-        .live(bars_json(GAP, &bar_rows(rows, picks, unit)))
-}
-
-/// Draws rows of bars in the narrow shape alone, for figures that are side by side.
-pub fn narrow_bar_figure(description: &str, rows: &[Row], scale: Scale, x_label: &str) -> Figure {
-    let mut figure = bar_figure(description, rows, scale, x_label);
-    figure.keep_narrowest();
-    figure
+/// Adds to a figure of bars the samples that each row marks in the linked plots.
+pub(crate) fn picking(figure: Figure, rows: &[Row], picks: &[Option<Pick>], unit: &str) -> Figure {
+    figure.live(bars_json(GAP, &bar_rows(rows, picks, unit)))
 }
 
 fn draw(area: &Area<'_>, rows: &[Row], scale: Scale, most: f64, x_label: &str) -> Drawn {

@@ -15,7 +15,7 @@ use super::{
     },
     canvas::Ink,
     diagnosis_page::{diagnosis_sections, diagnosis_title},
-    error_figure::{Against, error_figure, residual_figure},
+    error_figure::{Against, error_figure},
     estimate_figure::{closest_look, estimate_figure},
     first_seconds::headline,
     markup::{fixed, number, with_unit},
@@ -336,7 +336,6 @@ fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
         "Against the reference: what a model of the wrong shape gets wrong.".to_owned(),
     );
     page.figures(&[rate, place]);
-    page.figure(&residual_figure(evaluation, names), "How often each error occurs.");
 }
 
 fn shapes(page: &mut Page, calibrated: &[(&str, &Calibrated)], unit: &str) {

@@ -6,7 +6,7 @@ use stretch_problem::{effect_in_words, in_words, notation};
 use stretch_sim::Language;
 
 use super::{
-    bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure, picking_figure},
+    bar_figure::{Bar, Row, Scale, bar_figure, picking},
     canvas::Ink,
     diagnosis_tables::{
         baseline_table, candidate_numbers_table, candidate_table, difference_table, effects,
@@ -250,7 +250,9 @@ fn slices(page: &mut Page, subject: &Subject<'_>) {
         (!rows.is_empty()).then(|| {
             let picks: Vec<Option<Pick>> =
                 slices.iter().map(|s| pick(by, &s.slice, &words)).collect();
-            let figure = picking_figure(title, &rows, &picks, "\u{d7} the noise");
+            let unit = "\u{d7} the noise";
+            let figure = bar_figure(title, &rows, Scale::NoiseMultiples, unit).narrowest();
+            let figure = picking(figure, &rows, &picks, unit);
             (figure, format!("{title}."))
         })
     };
@@ -303,11 +305,11 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
         .collect();
     page.figures(&[
         (
-            narrow_bar_figure("Probability of every candidate", &odds, Scale::Percent, "%"),
+            bar_figure("Probability of every candidate", &odds, Scale::Percent, "%").narrowest(),
             "Probability among the candidates, given this catalogue.".to_owned(),
         ),
         (
-            narrow_bar_figure("Closed gap of every candidate", &closed, Scale::Percent, "%"),
+            bar_figure("Closed gap of every candidate", &closed, Scale::Percent, "%").narrowest(),
             "Share of the gap that closes on the test trials, with its 95 % interval.".to_owned(),
         ),
     ]);

@@ -1,14 +1,13 @@
-//! Errors against rate and reference, and the histogram of errors.
+//! Errors against rate and reference.
 
-use plotters::prelude::*;
 use stretch_calibrate::Evaluation;
 
 use super::{
     canvas::Ink,
     dots_figure::{Dots, Shared, dots_figure},
-    figure::{Axes, Figure, FigureSize, plot, stroke},
-    markup::{labelled, number, with_unit},
-    thin::{extent, padded, quantile, sorted},
+    figure::Figure,
+    markup::labelled,
+    thin::{padded, quantile, sorted},
 };
 
 /// Largest number of dots of one method.
@@ -65,52 +64,6 @@ pub(crate) fn error_figure(evaluation: &Evaluation, names: &[String], against: A
         })
         .collect();
     dots_figure(&description, &against, &panels)
-}
-
-/// Histogram of the errors, one outline for each method.
-pub(crate) fn residual_figure(evaluation: &Evaluation, names: &[String]) -> Figure {
-    let methods = points(evaluation, names.len(), Against::Reference);
-    let size = sorted(methods.iter().flatten().map(|(_, e)| e.abs()));
-    let most = quantile(&size, 0.995);
-    if !(most > 0.0 && most.is_finite()) {
-        return Figure::missing("There is no spread of errors to draw.");
-    }
-    let bins = 48;
-    let width = 2.0 * most / bins as f64;
-    let share = |points: &[(f64, f64)]| {
-        let mut counts = vec![0.0; bins];
-        for (_, e) in points.iter().filter(|(_, e)| e.abs() < most) {
-            counts[(((e + most) / width) as usize).min(bins - 1)] += 100.0 / points.len() as f64;
-        }
-        counts
-    };
-    let shares: Vec<Vec<f64>> = methods.iter().map(|points| share(points)).collect();
-    let top = extent(shares.iter().flatten().copied()).map_or(1.0, |span| span.end.max(1e-9));
-    let x_label = labelled("error", &evaluation.unit);
-    let y_label = format!("% of samples in {}", with_unit(&number(width, 2), &evaluation.unit));
-    let axes = Axes::new(-most..most, 0.0..1.06 * top, [&x_label, &y_label]);
-    let description =
-        format!("Histogram of the errors of {}; unit: {}", names.join(", "), evaluation.unit);
-    let steps = |counts: &[f64]| -> Vec<(f64, f64)> {
-        let edge = |i: usize| -most + i as f64 * width;
-        let bars = counts.iter().enumerate();
-        bars.flat_map(|(i, &c)| [(edge(i), c), (edge(i + 1), c)]).collect()
-    };
-    let draw = |area: &super::figure::Area<'_>| {
-        plot(area, &axes, |chart| {
-            for (i, counts) in shares.iter().enumerate() {
-                let (ink, outline) = (Ink::of(i), steps(counts));
-                chart.draw_series(AreaSeries::new(outline.clone(), 0.0, ink.faint(0.14)))?;
-                chart.draw_series(LineSeries::new(outline, stroke(ink.color(), 1.8)))?;
-            }
-            Ok(())
-        })
-    };
-    let legend = names.iter().enumerate().map(|(i, name)| (Ink::of(i), name.clone()));
-    Figure::new(&description)
-        .draw(FigureSize::NARROW, draw)
-        .draw(FigureSize::WIDE, draw)
-        .legend(legend)
 }
 
 /// Returns, for each method, the abscissa and the error of each sample of all trials.

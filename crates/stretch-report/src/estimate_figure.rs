@@ -6,24 +6,28 @@ use stretch_calibrate::{Evaluation, TrialErrors};
 
 use super::{
     canvas::Ink,
-    figure::{Figure, FigureSize, lines_figure},
-    live::TimePlot,
-    markup::{number, with_unit},
+    figure::{Figure, FigureSize},
+    markup::{labelled, number},
     thin::extent,
+    time_figure::TimePlot,
 };
 
 /// Length of the window of [`closest_look`], in seconds.
 const WINDOW_S: f64 = 8.0;
 
-/// Draws a trial over its whole time; `names` are the names of the methods.
+/// Draws a trial over its whole time; `names` are the names of the methods. If there is a closer look, its figure holds
+/// the curves, and this figure marks the window that is shown.
 pub(crate) fn estimate_figure(
     evaluation: &Evaluation,
     trial: &TrialErrors,
     names: &[String],
 ) -> Figure {
+    let closer = liveliest(trial);
     match extent(trial.time_s.iter().copied()) {
-        Some(time) if time.end > time.start => window_figure(evaluation, trial, names, &time)
-            .live(live(evaluation, trial, names, liveliest(trial).unwrap_or(time), true)),
+        Some(time) if time.end > time.start => {
+            let view = closer.clone().unwrap_or_else(|| time.clone());
+            window_figure(evaluation, trial, names, (&time, view, closer.is_some()))
+        }
         _ => Figure::missing("The trial is too short to draw."),
     }
 }
@@ -35,72 +39,41 @@ pub(crate) fn closest_look(
     names: &[String],
 ) -> Figure {
     match liveliest(trial) {
-        Some(window) => window_figure(evaluation, trial, names, &window)
-            .live(live(evaluation, trial, names, window, false)),
+        Some(window) => window_figure(evaluation, trial, names, (&window, window.clone(), false)),
         None => Figure::missing("The trial is too short for a closer look."),
     }
-}
-
-/// Returns the curves of a trial for the page's script. The closer look holds the curves; the figure of the whole
-/// recording marks the window that is shown.
-fn live(
-    evaluation: &Evaluation,
-    trial: &TrialErrors,
-    names: &[String],
-    view: Range<f64>,
-    is_second: bool,
-) -> Option<String> {
-    let is_whole = is_second && liveliest(trial).is_some();
-    let estimates = trial.estimates.iter().zip(names).enumerate();
-    let lines = std::iter::once(("reference", Ink::Truth, 2.8, &trial.reference[..]))
-        .chain(estimates.map(|(i, (y, name))| (name.as_str(), Ink::of(i), 1.4, &y[..])));
-    let y_label = y_label(evaluation);
-    TimePlot {
-        link: trial.trial.clone(),
-        labels: ["time, s", &y_label],
-        unit: &evaluation.unit,
-        height: FigureSize::WIDE.height,
-        time: &trial.time_s,
-        view,
-        is_whole,
-        lines: lines.collect(),
-        keys: Vec::new(),
-        moves: None,
-    }
-    .json()
-}
-
-fn y_label(evaluation: &Evaluation) -> String {
-    let label = with_unit("reference and estimates,", &evaluation.unit);
-    label.trim_end_matches(',').to_owned()
 }
 
 fn window_figure(
     evaluation: &Evaluation,
     trial: &TrialErrors,
     names: &[String],
-    window: &Range<f64>,
+    (drawn, view, is_whole): (&Range<f64>, Range<f64>, bool),
 ) -> Figure {
     // the reference is a broad line below, so that a correct estimate lies inside it
-    let broad = if window.end - window.start > 2.0 * WINDOW_S { 2.0 } else { 3.4 };
-    let estimates = trial.estimates.iter().enumerate();
-    let mut lines = vec![(Ink::Truth, broad, &trial.reference[..])];
-    lines.extend(estimates.map(|(i, y)| (Ink::of(i), 1.4, &y[..])));
-    let from_to = [window.start, window.end].map(|t| number(t, 3)).join(" to ");
+    let broad = if drawn.end - drawn.start > 2.0 * WINDOW_S { 2.0 } else { 3.4 };
+    let estimates = trial.estimates.iter().zip(names).enumerate();
+    let lines = std::iter::once(("reference", Ink::Truth, broad, &trial.reference[..]))
+        .chain(estimates.map(|(i, (y, name))| (name.as_str(), Ink::of(i), 1.4, &y[..])));
+    let from_to = [drawn.start, drawn.end].map(|t| number(t, 3)).join(" to ");
     let description = format!(
         "Reference and estimates of {} over time, from {from_to} s; unit: {}",
         trial.trial, evaluation.unit
     );
-    let y_label = y_label(evaluation);
-    let axes = (window, 0.04, ["time, s", &*y_label]);
-    let heights = [FigureSize::NARROW, FigureSize::WIDE].map(|frame| frame.height);
-    let missing = "Reference and estimates have no values here.";
-    let methods = names.iter().enumerate().map(|(i, name)| (Ink::of(i), name.clone()));
-    let figure = lines_figure(&description, axes, heights, (&trial.time_s, &lines), missing);
-    if figure.missing.is_some() {
-        return figure;
-    }
-    figure.legend([(Ink::Truth, "reference".to_owned())]).legend(methods)
+    let plot = TimePlot {
+        link: &trial.trial,
+        labels: ["time, s", &labelled("reference and estimates", &evaluation.unit)],
+        unit: &evaluation.unit,
+        height: FigureSize::WIDE.height,
+        time: &trial.time_s,
+        drawn,
+        view,
+        is_whole,
+        lines: lines.collect(),
+        keys: Vec::new(),
+        moves: None,
+    };
+    plot.figure(&description, "Reference and estimates have no values here.")
 }
 
 /// The window of [`WINDOW_S`] in which the reference travels farthest, in the

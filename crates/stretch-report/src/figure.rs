@@ -11,7 +11,6 @@ use plotters::{
 use super::{
     canvas::{Canvas, Ink, STEPS},
     markup::{escape, number, tick},
-    thin::{curve, extent, padded},
 };
 
 /// Font size of words and numbers, in pixels of the figure.
@@ -88,9 +87,11 @@ impl Figure {
     }
 
     /// Keeps only the shape for phones, for figures that are side by side.
-    pub fn keep_narrowest(&mut self) {
+    #[must_use]
+    pub fn narrowest(mut self) -> Self {
         let narrowest = self.drawings.iter().map(|(frame, _)| frame.width).min();
         self.drawings.retain(|(frame, _)| Some(frame.width) == narrowest);
+        self
     }
 
     /// Adds a legend.
@@ -182,43 +183,6 @@ impl Axes {
         let [x_label, y_label] = labels.map(str::to_owned);
         Self { x, y, x_label, y_label, is_log: false }
     }
-}
-
-/// A line over time: its ink, its width in pixels, and its values.
-pub(crate) type Line<'a> = (Ink, f64, &'a [f64]);
-
-/// Draws lines over time in two frames of these heights, the frame for phones first. The axes span all lines. `missing`
-/// is shown if the lines have no number.
-pub(crate) fn lines_figure(
-    description: &str,
-    (x, pad, labels): (&Range<f64>, f64, [&str; 2]),
-    [narrow, wide]: [u32; 2],
-    (time, lines): (&[f64], &[Line<'_>]),
-    missing: &str,
-) -> Figure {
-    let pieces = |bins: usize| {
-        let thin = move |&(ink, width, y): &Line<'_>| (ink, width, curve(time, y, x, bins));
-        lines.iter().map(thin).collect::<Vec<_>>()
-    };
-    let [for_phones, for_desktops] = [360, 750].map(pieces);
-    let points = for_desktops.iter().flat_map(|(.., pieces)| pieces.iter().flatten());
-    let Some(y) = extent(points.map(|(_, y)| *y)) else {
-        return Figure::missing(missing);
-    };
-    let axes = Axes::new(x.clone(), padded(&y, pad), labels);
-    let frames = [(400, narrow, for_phones), (880, wide, for_desktops)];
-    frames.into_iter().fold(Figure::new(description), |figure, (width, height, lines)| {
-        figure.draw(FigureSize { width, height }, |area| {
-            plot(area, &axes, |chart| {
-                for (ink, width, pieces) in lines {
-                    for piece in pieces {
-                        chart.draw_series(LineSeries::new(piece, stroke(ink.color(), width)))?;
-                    }
-                }
-                Ok(())
-            })
-        })
-    })
 }
 
 /// Returns the style of a text in an ink, aligned at `h` and `v`.

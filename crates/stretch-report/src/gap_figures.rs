@@ -8,11 +8,11 @@ use super::{
     bar_figure::GAP,
     canvas::Ink,
     dots_figure::{Dots, Shared, dots_figure},
-    figure::{Figure, Line, lines_figure},
-    live::TimePlot,
+    figure::Figure,
     markup::labelled,
     subject::Subject,
     thin::{padded, quantile, sorted},
+    time_figure::TimePlot,
 };
 
 /// Length of the window that is drawn, s.
@@ -62,58 +62,53 @@ pub(crate) fn trace_figures(
 ) -> (Figure, Figure) {
     let Shown { samples: trial, time_s: time, window, .. } = shown;
     let (evidence, spec) = (&subject.evidence.stages[stage], &subject.simulator.stages()[stage]);
-    let span = trial.clone();
     let measured = &subject.simulator.measured(stage)[trial.clone()];
-    let after = has_after(subject);
-    let mut lines =
-        vec![(Ink::Truth, 3.2, measured), (BEFORE, 1.5, &evidence.retuned[trial.clone()])];
-    let mut left = vec![(BEFORE, 1.4, &evidence.residual_retuned[trial.clone()])];
-    let mut legend = vec![
-        (Ink::Truth, "measured".to_owned()),
-        (BEFORE, "simulated, parameters re-tuned".to_owned()),
+    let [retuned, with] = [
+        "simulated, parameters re-tuned".to_owned(),
+        format!("simulated, {}", after_name(subject.diagnosis)),
     ];
-    if after {
-        lines.push((AFTER, 1.5, &evidence.after[trial.clone()]));
-        left.push((AFTER, 1.4, &evidence.residual_after[trial.clone()]));
-        legend.push((AFTER, format!("simulated, {}", after_name(subject.diagnosis))));
+    let mut lines = vec![
+        ("measured", Ink::Truth, 3.2, measured),
+        (&*retuned, BEFORE, 1.5, &evidence.retuned[trial.clone()]),
+    ];
+    let mut left = vec![(&*retuned, BEFORE, 1.4, &evidence.residual_retuned[trial.clone()])];
+    if has_after(subject) {
+        lines.push((&*with, AFTER, 1.5, &evidence.after[trial.clone()]));
+        left.push((&*with, AFTER, 1.4, &evidence.residual_after[trial.clone()]));
     }
     let name = labelled(&spec.channel, &spec.unit);
     let motion = subject.simulator.motion().values;
-    let keys = [("level", motion.to_vec()), ("rate", rates(subject, motion))]
-        .map(|(key, values)| (key, values.get(span.clone()).unwrap_or_default().to_vec()));
-    let names: Vec<&str> = legend.iter().map(|(_, name)| name.as_str()).collect();
-    let live = |lines: &[Line<'_>], names: &[&str], is_first: bool| {
-        let lines = lines.iter().zip(names).map(|(&(ink, w, y), name)| (*name, ink, w, y));
-        TimePlot {
-            link: GAP.to_owned(),
-            labels: [TIME, if is_first { &name } else { LEFT }],
-            unit: if is_first { &spec.unit } else { "\u{d7} the noise" },
-            height: if is_first { 280 } else { 190 },
-            time,
-            view: window.clone(),
-            is_whole: false,
-            lines: lines.collect(),
-            keys: keys.iter().filter(|_| is_first).map(|(key, y)| (*key, &y[..])).collect(),
-            moves: Some(if is_first { "out" } else { "left" }),
-        }
-        .json()
-    };
-    let (whole, whole_left) = (live(&lines, &names, true), live(&left, &names[1..], false));
-    let left_legend = legend[1..].to_vec();
-    let figure = |lines: &[Line<'_>], name: &str, height: u32| {
+    let rates = rates(subject, motion);
+    let keys = [("level", motion), ("rate", &rates[..])]
+        .map(|(key, values)| (key, values.get(trial.clone()).unwrap_or_default()));
+    let figure = |name: &str, plot: TimePlot<'_>| {
         let description = format!("{name} over time, eight seconds of a test trial");
-        let axes = (window, 0.06, [TIME, name]);
-        let heights = [height.min(250), height];
-        lines_figure(
-            &description,
-            axes,
-            heights,
-            (time, lines),
-            "There are no values to draw here.",
-        )
+        plot.figure(&description, "There are no values to draw here.")
     };
-    let top = figure(&lines, &name, 280).legend(legend).live(whole);
-    (top, figure(&left, LEFT, 190).legend(left_legend).live(whole_left))
+    let plot = TimePlot {
+        link: GAP,
+        labels: [TIME, &name],
+        unit: &spec.unit,
+        height: 280,
+        time,
+        drawn: window,
+        view: window.clone(),
+        is_whole: false,
+        lines,
+        keys: keys.to_vec(),
+        moves: Some("out"),
+    };
+    let left = TimePlot {
+        labels: [TIME, LEFT],
+        unit: "\u{d7} the noise",
+        height: 190,
+        view: window.clone(),
+        lines: left,
+        keys: Vec::new(),
+        moves: Some("left"),
+        ..plot
+    };
+    (figure(&name, plot), figure(LEFT, left))
 }
 
 /// The test trial with the largest gap, and the eight seconds of that trial with the largest error of the re-tuned

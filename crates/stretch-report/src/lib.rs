@@ -24,6 +24,7 @@ mod signal_figure;
 mod subject;
 mod surface_figure;
 mod thin;
+mod time_figure;
 mod turn_figure;
 
 pub use calibration_page::{
@@ -49,7 +50,7 @@ pub mod kit {
     //! types needs the same version of `plotters`.
 
     pub use crate::{
-        bar_figure::{Bar, Row, Scale, bar_figure, narrow_bar_figure},
+        bar_figure::{Bar, Row, Scale, bar_figure},
         canvas::{Canvas, Ink, STEPS},
         figure::{
             Area, Axes, Chart, Drawn, Figure, FigureSize, TEXT_PX, dot, plot, px, stroke, words,

@@ -10,10 +10,7 @@ use std::ops::Range;
 use serde::Serialize;
 use stretch_core::is_hidden;
 
-use super::{
-    canvas::{Ink, STEPS},
-    thin::extent,
-};
+use super::{canvas::STEPS, thin::extent, time_figure::TimePlot};
 
 /// Slots over a whole recording.
 const COARSE: usize = 600;
@@ -54,62 +51,38 @@ pub(crate) struct Pick {
     pub(crate) size: bool,
 }
 
-/// A plot over time.
-#[derive(Debug)]
-pub(crate) struct TimePlot<'a> {
-    /// Name of the group of plots that zoom together.
-    pub(crate) link: String,
-    /// Labels of the horizontal and the vertical axis.
-    pub(crate) labels: [&'a str; 2],
-    /// Unit of the values.
-    pub(crate) unit: &'a str,
-    /// Height in pixels.
-    pub(crate) height: u32,
-    /// Times of the samples.
-    pub(crate) time: &'a [f64],
-    /// The first view.
-    pub(crate) view: Range<f64>,
-    /// Whether the plot always shows the whole recording, draws the curves of the linked plots and marks their view.
-    pub(crate) is_whole: bool,
-    /// Name, colour, width in pixels, values.
-    pub(crate) lines: Vec<(&'a str, Ink, f64, &'a [f64])>,
-    /// Keys by which samples are picked, with their values.
-    pub(crate) keys: Vec<(&'static str, &'a [f64])>,
-    /// Effect of a varied parameter on the curves: `out` adds to a curve, `left` subtracts from it.
-    pub(crate) moves: Option<&'static str>,
-}
-
-impl TimePlot<'_> {
-    /// The plot as JSON; `None` without a span of time.
-    pub(crate) fn json(&self) -> Option<String> {
-        let span = extent(self.time.iter().copied()).filter(|s| s.end > s.start)?;
-        let levels = |values: &[f64]| levels(self.time, values, [&span, &self.view], ends);
-        let lines = if self.is_whole { &[][..] } else { &self.lines[..] };
-        let series: Vec<Series<'_>> = lines
-            .iter()
-            .map(|(name, ink, w, y)| Series { name, ink: ink.class(), w: *w, levels: levels(y) })
-            .collect();
-        let keys: serde_json::Map<_, _> = self
-            .keys
-            .iter()
-            .map(|(key, values)| ((*key).to_owned(), serde_json::json!(levels(values))))
-            .collect();
-        let figure = serde_json::json!({
-            "kind": "time",
-            "link": self.link,
-            "x": self.labels[0],
-            "y": self.labels[1],
-            "unit": self.unit,
-            "height": self.height,
-            "span": [span.start, span.end],
-            "view": [self.view.start, self.view.end],
-            "all": self.is_whole,
-            "series": series,
-            "keys": keys,
-            "moves": self.moves,
-        });
-        Some(figure.to_string())
+/// A plot over time as JSON; `None` without a link or a span of time.
+pub(crate) fn time_json(plot: &TimePlot<'_>) -> Option<String> {
+    let span = extent(plot.time.iter().copied()).filter(|s| s.end > s.start)?;
+    if plot.link.is_empty() {
+        return None;
     }
+    let levels = |values: &[f64]| levels(plot.time, values, [&span, &plot.view], ends);
+    let lines = if plot.is_whole { &[][..] } else { &plot.lines[..] };
+    let series: Vec<Series<'_>> = lines
+        .iter()
+        .map(|(name, ink, w, y)| Series { name, ink: ink.class(), w: *w, levels: levels(y) })
+        .collect();
+    let keys: serde_json::Map<_, _> = plot
+        .keys
+        .iter()
+        .map(|(key, values)| ((*key).to_owned(), serde_json::json!(levels(values))))
+        .collect();
+    let figure = serde_json::json!({
+        "kind": "time",
+        "link": plot.link,
+        "x": plot.labels[0],
+        "y": plot.labels[1],
+        "unit": plot.unit,
+        "height": plot.height,
+        "span": [span.start, span.end],
+        "view": [plot.view.start, plot.view.end],
+        "all": plot.is_whole,
+        "series": series,
+        "keys": keys,
+        "moves": plot.moves,
+    });
+    Some(figure.to_string())
 }
 
 /// Change of a curve with a varied parameter, on the grids of the curve.

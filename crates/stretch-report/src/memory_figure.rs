@@ -7,9 +7,9 @@ use stretch_core::Calibration;
 use super::{
     canvas::Ink,
     figure::{Axes, Figure, FigureSize, plot, stroke},
-    live::TimePlot,
     markup::labelled,
     thin::{extent, padded},
+    time_figure::TimePlot,
 };
 
 /// Seconds of rest before a step, and at each of its two levels.
@@ -54,37 +54,22 @@ pub(crate) fn step_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
             "This calibration needs more inputs than the signal, so it cannot be shown for the signal alone.",
         );
     };
-    let Some(y) = extent(answer.estimate.iter().copied()) else {
-        return Figure::missing("There is no estimate to draw.");
-    };
-    let y_label = labelled("estimate", unit);
-    let labels = ["time, s", &y_label];
-    let axes = Axes::new(0.0..3.0 * HOLD_S, padded(&y, 0.06), labels);
-    let points: Vec<(f64, f64)> =
-        answer.time_s.iter().copied().zip(answer.estimate.iter().copied()).collect();
-    let live = TimePlot {
-        link: format!("step of {name}"),
-        labels,
+    let drawn = 0.0..3.0 * HOLD_S;
+    let plot = TimePlot {
+        link: &format!("step of {name}"),
+        labels: ["time, s", &labelled("estimate", unit)],
         unit,
-        height: 290,
+        height: FigureSize::NARROW.height,
         time: &answer.time_s,
-        view: axes.x.clone(),
+        drawn: &drawn,
+        view: drawn.clone(),
         is_whole: false,
         lines: vec![("estimate", Ink::Third, 2.0, &answer.estimate)],
         keys: Vec::new(),
         moves: None,
     };
-    Figure::new(&format!("Response of {name} to a step of the signal"))
-        .draw(FigureSize::NARROW, |area| {
-            plot(area, &axes, |chart| {
-                for run in points.split(|(_, y)| !y.is_finite()) {
-                    let line = super::thin::sample_in_order(run, 900);
-                    chart.draw_series(LineSeries::new(line, stroke(Ink::Third.color(), 2.0)))?;
-                }
-                Ok(())
-            })
-        })
-        .live(live.json())
+    let description = format!("Response of {name} to a step of the signal");
+    plot.figure(&description, "There is no estimate to draw.").narrowest()
 }
 
 /// Draws the estimate over a triangular signal. For a model without memory this is a single line.

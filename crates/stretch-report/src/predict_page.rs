@@ -7,10 +7,11 @@ use stretch_problem::{PredictedOutput, Prediction};
 
 use super::{
     canvas::Ink,
-    figure::{Figure, lines_figure},
+    figure::Figure,
     gap_figures::{AFTER, BEFORE, worst_window},
     markup::{labelled, number},
     page::{Page, Table},
+    time_figure::TimePlot,
 };
 
 /// The report as a page.
@@ -72,26 +73,27 @@ pub fn predict_table(prediction: &Prediction) -> Table {
     Table::new("Root mean square errors of the prediction", &head, rows)
 }
 
-fn traces(prediction: &Prediction, output: &PredictedOutput, window: &Range<f64>) -> Figure {
+fn traces(prediction: &Prediction, output: &PredictedOutput, drawn: &Range<f64>) -> Figure {
     let time: Vec<f64> = (0..output.measured.len()).map(|i| i as f64 * prediction.dt_s).collect();
-    let lines = [
-        (Ink::Truth, 3.2, &output.measured[..]),
-        (BEFORE, 1.5, &output.without[..]),
-        (AFTER, 1.5, &output.with[..]),
-    ];
+    let with = format!("predicted with {}", prediction.effects_in_words().join(" and "));
     let name = labelled(&output.column, &output.unit);
-    let axes = (window, 0.06, ["time in the recording, s", &*name]);
+    let plot = TimePlot {
+        link: "",
+        labels: ["time in the recording, s", &name],
+        unit: &output.unit,
+        height: 280,
+        time: &time,
+        drawn,
+        view: drawn.clone(),
+        is_whole: false,
+        lines: vec![
+            ("measured", Ink::Truth, 3.2, &output.measured[..]),
+            ("predicted without the fix", BEFORE, 1.5, &output.without[..]),
+            (&*with, AFTER, 1.5, &output.with[..]),
+        ],
+        keys: Vec::new(),
+        moves: None,
+    };
     let description = format!("{name} over time, measured and predicted");
-    lines_figure(
-        &description,
-        axes,
-        [250, 280],
-        (&time, &lines),
-        "There are no values to draw here.",
-    )
-    .legend(vec![
-        (Ink::Truth, "measured".to_owned()),
-        (BEFORE, "predicted without the fix".to_owned()),
-        (AFTER, format!("predicted with {}", prediction.effects_in_words().join(" and "))),
-    ])
+    plot.figure(&description, "There are no values to draw here.")
 }

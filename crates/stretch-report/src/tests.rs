@@ -145,10 +145,10 @@ fn a_page_is_one_well_formed_file_with_every_figure() {
     let page = made.page(&context("tuesday"));
     let all = elements(&page);
     let count = |name: &str| all.iter().filter(|e| *e == name).count();
-    // twice over time, signal and reference, errors twice, histogram, two surfaces, two cuts
-    assert_eq!(count("figure"), 10);
-    // four of them in a shape for phones and one for desktops
-    assert_eq!(count("svg"), 14);
+    // twice over time, signal and reference, errors twice, two surfaces, two cuts
+    assert_eq!(count("figure"), 9);
+    // three of them in a shape for phones and one for desktops
+    assert_eq!(count("svg"), 12);
     assert!(!page.contains("class=\"missing\""));
     // methods, comparisons, signals; coefficients of three fits, orders of two
     assert_eq!(count("table"), 8);

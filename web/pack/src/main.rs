@@ -7,6 +7,7 @@
 
 use std::{env, error::Error, fs, io::Write, path::Path};
 
+use base64::{Engine as _, engine::general_purpose::STANDARD};
 use flate2::{Compression, write::GzEncoder};
 use wasm_bindgen_cli_support::Bindgen;
 
@@ -43,7 +44,7 @@ fn main() -> Outcome<()> {
                 html += &format!("<script type=\"text/plain\" id=\"worker\">{text}</script>\n");
             }
             ["<!--", "wasm", "-->"] => {
-                let packed = script::base64(&gzip(&glue.wasm)?);
+                let packed = STANDARD.encode(gzip(&glue.wasm)?);
                 html +=
                     &format!("<script type=\"application/gzip\" id=\"wasm\">{packed}</script>\n");
             }

@@ -1,4 +1,4 @@
-//! A calibration surface with the samples it was fitted to: in space, and cut at three rates.
+//! A calibration surface with the samples it was fitted to: in space, for the page's script, and cut at three rates.
 
 use plotters::{
     prelude::*,
@@ -8,8 +8,8 @@ use plotters::{
 use super::{
     branch::BranchView,
     canvas::Ink,
-    figure::{Area, Axes, Drawn, Figure, FigureSize, dot, plot, px, stroke, words},
-    markup::{number, tick},
+    figure::{Axes, Figure, FigureSize, dot, plot, px, stroke, words},
+    markup::number,
     signal_figure::AT_REST,
     thin::{padded, quantile, sample, sorted},
 };
@@ -17,10 +17,8 @@ use super::{
 /// Cells along each side of the mesh.
 const CELLS: usize = 18;
 
-/// Largest number of dots.
-const DOTS: usize = 900;
-
-/// The surface in the region that samples support, with dots above and below.
+/// The surface in the region that samples support, with dots above and below. The page's script draws it; without the
+/// script the cuts of [`slice_figure`] show the same surface.
 pub(crate) fn surface_figure(view: &BranchView<'_>, ink: Ink) -> Figure {
     let name = view.name();
     let [rate, signal, target] = &view.labels;
@@ -29,7 +27,11 @@ pub(crate) fn surface_figure(view: &BranchView<'_>, ink: Ink) -> Figure {
     );
     let legend = [(ink, format!("{name} surface")), (Ink::Truth, "samples of the fit".to_owned())];
     Figure::new(&description)
-        .draw(FigureSize { width: 400, height: 340 }, |area| draw(area, view, ink))
+        .draw(FigureSize { width: 400, height: 40 }, |area| {
+            let style = words(Ink::Text, HPos::Center, VPos::Center);
+            let note = "This picture needs scripts. The cuts below do not.";
+            area.draw(&Text::new(note, (px(200.0), px(20.0)), style))
+        })
         .legend(legend)
         .live(live(view, ink))
 }
@@ -77,47 +79,6 @@ fn live(view: &BranchView<'_>, ink: Ink) -> String {
 
 /// Range of heights that are drawn. It is limited because a polynomial may leave the box where samples are few.
 const INSIDE: std::ops::RangeInclusive<f64> = -0.15..=1.15;
-
-/// Projection of the unit cube onto the page: signal to the right, rate to the left, target up.
-#[derive(Clone, Copy)]
-struct View {
-    cos: f64,
-    sin: f64,
-    tilt: f64,
-    left: f64,
-    top: f64,
-    scale: (f64, f64),
-}
-
-impl View {
-    const YAW: f64 = 0.62;
-    const PITCH: f64 = 0.42;
-
-    fn new(left: f64, top: f64, width: f64, height: f64) -> Self {
-        let (sin, cos) = Self::YAW.sin_cos();
-        let tilt = Self::PITCH.sin() / Self::PITCH.cos();
-        let scale = (width / (sin + cos), height / (1.0 + tilt * (sin + cos)));
-        Self { cos, sin, tilt, left, top, scale }
-    }
-
-    /// The place of a point of the cube, in pixels.
-    fn at(&self, u: f64, r: f64, z: f64) -> (f64, f64) {
-        let across = self.cos * u + self.sin * (1.0 - r);
-        let up = z + self.tilt * self.depth(u, r);
-        let all = 1.0 + self.tilt * (self.sin + self.cos);
-        (self.left + self.scale.0 * across, self.top + self.scale.1 * (all - up))
-    }
-
-    /// Distance of a point from the eye; 0 is the nearest.
-    fn depth(&self, u: f64, r: f64) -> f64 {
-        self.sin * u + self.cos * r
-    }
-
-    fn place(&self, [u, r, z]: [f64; 3]) -> (i32, i32) {
-        let (x, y) = self.at(u, r, z);
-        (px(x), px(y))
-    }
-}
 
 /// Conversion from the units of a view to coordinates of the unit cube.
 struct Cube<'a>(&'a BranchView<'a>);
@@ -172,112 +133,6 @@ fn near(cells: &[bool], say: impl Fn(usize, usize) -> bool) -> Vec<bool> {
         say(rows.clone().map(lit).sum(), rows.len() * columns.len())
     };
     (0..cells.len()).map(around).collect()
-}
-
-fn draw(area: &Area<'_>, view: &BranchView<'_>, ink: Ink) -> Drawn {
-    let cube = Cube(view);
-    let eye = View::new(46.0, 30.0, 342.0, 268.0);
-    floor(area, view, &eye)?;
-    let (mut above, mut below) = (Vec::new(), Vec::new());
-    for [rate, signal, target] in sample(&view.cloud, DOTS) {
-        let (u, r, z) = (cube.u(signal), cube.r(rate), cube.z(target));
-        if (0.0..=1.0).contains(&r) {
-            let side = if z >= cube.height(u, r) { &mut above } else { &mut below };
-            side.push(eye.place([u, r, z]));
-        }
-    }
-    // seen from above, points below the surface lie behind it
-    for &place in &below {
-        area.draw(&Circle::new(place, px(0.9), dot(Ink::Truth, 0.35)))?;
-    }
-    mesh(area, &cube, &eye, ink)?;
-    for &place in &above {
-        area.draw(&Circle::new(place, px(0.9), dot(Ink::Truth, 0.55)))?;
-    }
-    Ok(())
-}
-
-/// Draws the cells from the farthest to the nearest, darker where the surface is steeper.
-fn mesh(area: &Area<'_>, cube: &Cube<'_>, eye: &View, ink: Ink) -> Drawn {
-    let supported = cube.supported();
-    let at = |i: usize| i as f64 / CELLS as f64;
-    let mut cells: Vec<(usize, usize)> =
-        (0..CELLS * CELLS).map(|c| (c / CELLS, c % CELLS)).collect();
-    cells.sort_by(|a, b| eye.depth(at(b.0), at(b.1)).total_cmp(&eye.depth(at(a.0), at(a.1))));
-    for (i, j) in cells {
-        let corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
-            .map(|(i, j)| [at(i), at(j), cube.height(at(i), at(j))]);
-        if corners.iter().any(|c| !INSIDE.contains(&c[2])) {
-            continue;
-        }
-        let slope = (corners[1][2] - corners[0][2]) * CELLS as f64;
-        let shade = 0.25 + 0.3 * (slope / 2.0).clamp(0.0, 1.0);
-        let places = corners.map(|c| eye.place(c));
-        let lit = supported[i * CELLS + j];
-        if lit {
-            area.draw(&Polygon::new(places.to_vec(), ink.faint(shade)))?;
-        }
-        let edge = stroke(ink.faint(if lit { 0.8 } else { 0.3 }), 0.5);
-        area.draw(&PathElement::new(places[..3].to_vec(), edge))?;
-    }
-    Ok(())
-}
-
-/// Draws floor, walls, numbers and names of the axes.
-fn floor(area: &Area<'_>, view: &BranchView<'_>, eye: &View) -> Drawn {
-    let line = |style: ShapeStyle, a: [f64; 3], b: [f64; 3]| {
-        area.draw(&PathElement::new(vec![eye.place(a), eye.place(b)], style))
-    };
-    let grid = stroke(Ink::Grid.color(), 1.0);
-    let axis = stroke(Ink::Axis.color(), 1.0);
-    let [rate_ticks, signal_ticks, target_ticks] =
-        [&view.rate, &view.signal, &view.target].map(|span| round_numbers(span.start, span.end));
-    let cube = Cube(view);
-    let text = |text: String, (x, y): (f64, f64), h: HPos, v: VPos| {
-        area.draw(&Text::new(text, (px(x), px(y)), words(Ink::Text, h, v)))
-    };
-    let span = |span: &std::ops::Range<f64>| span.end - span.start;
-    for value in signal_ticks {
-        let u = cube.u(value);
-        line(grid, [u, 0.0, 0.0], [u, 1.0, 0.0])?;
-        line(grid, [u, 1.0, 0.0], [u, 1.0, 1.0])?;
-        let (x, y) = eye.at(u, 0.0, 0.0);
-        text(tick(value, span(&view.signal)), (x + 4.0, y + 4.0), HPos::Left, VPos::Top)?;
-    }
-    for value in rate_ticks {
-        let r = cube.r(value);
-        line(grid, [0.0, r, 0.0], [1.0, r, 0.0])?;
-        line(grid, [1.0, r, 0.0], [1.0, r, 1.0])?;
-        let (x, y) = eye.at(0.0, r, 0.0);
-        text(tick(value, span(&view.rate)), (x - 4.0, y + 4.0), HPos::Right, VPos::Top)?;
-    }
-    for value in target_ticks {
-        let z = cube.z(value);
-        line(grid, [0.0, 1.0, z], [1.0, 1.0, z])?;
-        line(grid, [1.0, 1.0, z], [1.0, 0.0, z])?;
-        let (x, y) = eye.at(0.0, 1.0, z);
-        text(tick(value, span(&view.target)), (x - 5.0, y), HPos::Right, VPos::Center)?;
-    }
-    line(axis, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0])?;
-    line(axis, [0.0, 0.0, 0.0], [0.0, 1.0, 0.0])?;
-    line(axis, [0.0, 1.0, 0.0], [0.0, 1.0, 1.0])?;
-    let [rate, signal, target] = &view.labels;
-    text(target.clone(), (4.0, 3.0), HPos::Left, VPos::Top)?;
-    text(format!("\u{2199} {rate}"), (4.0, 337.0), HPos::Left, VPos::Bottom)?;
-    text(format!("{signal} \u{2198}"), (396.0, 337.0), HPos::Right, VPos::Bottom)
-}
-
-/// Returns two to five round numbers inside a span.
-fn round_numbers(low: f64, high: f64) -> Vec<f64> {
-    let rough = (high - low) / 4.0;
-    let ten = 10f64.powf(rough.log10().floor());
-    let step = [1.0, 2.0, 2.5, 5.0, 10.0]
-        .map(|m| m * ten)
-        .into_iter()
-        .find(|step| *step >= 0.999 * rough)
-        .unwrap_or(rough);
-    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
-    (first..=last).take(6).map(|k| k as f64 * step).collect()
 }
 
 /// Inks of a slow, a middle and a fast rate.

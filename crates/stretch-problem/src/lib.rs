@@ -25,7 +25,7 @@ pub use black_box::{
     ProblemSpec, RecordedSession, SessionColumn, SessionPart, SessionStage, Source, SourceError,
     StageEntry, State, TrialFile, closure,
 };
-pub use by_trial::{Apart, ByTrial, Heterogeneity, RunFit};
+pub use by_trial::{Apart, ByTrial, Heterogeneity, RunFit, q_values};
 pub use causes::{Causes, causes};
 pub use error::ProblemError;
 pub use examine::{Examined, diagnosis_schema};

@@ -33,7 +33,7 @@ const FILE: usize = 1 << 20;
 const TIMES: usize = 7;
 
 /// The timed queries.
-const QUERIES: [(&str, &str); 7] = [
+const QUERIES: [(&str, &str); 6] = [
     ("scan", "select sum(rate), sum(bridge_v), sum(contraction) from trials"),
     (
         "scan by sensor",
@@ -51,10 +51,6 @@ const QUERIES: [(&str, &str); 7] = [
     (
         "poly13_fit by sensor",
         "select sensor, poly13_fit(rate, bridge_v, contraction) from trials group by sensor",
-    ),
-    (
-        "agreement by sensor",
-        "select sensor, agreement(contraction, bridge_v) from trials group by sensor",
     ),
 ];
 

@@ -16,8 +16,7 @@ use stretch_fit::{Factor, Fit, FitError};
 
 use crate::{
     about::About,
-    state::{Partial, Span},
-    triangles::Outcome,
+    state::{Outcome, Partial, Span},
 };
 
 /// The columns of numbers between the counts and the coefficients.

@@ -1,32 +1,30 @@
-//! The aggregate functions: the fits `poly13_fit`, `linear_fit`, `polyij_fit`, `poly13_state` and `poly13_merge`, and
-//! `agreement`.
+//! The aggregate functions: the fits `poly13_fit`, `linear_fit`, `poly13_state` and `poly13_merge`.
 
 use std::sync::Arc;
 
 use datafusion::{
     arrow::{
-        array::{ArrayRef, BinaryBuilder, BooleanArray, RecordBatch},
-        datatypes::{DataType, Field, FieldRef, Schema},
+        array::{ArrayRef, BinaryBuilder, BooleanArray},
+        datatypes::{DataType, Field, FieldRef},
     },
-    common::{Result, ScalarValue, cast::as_float64_array, plan_datafusion_err},
+    common::{Result, cast::as_float64_array, plan_datafusion_err},
     logical_expr::{
-        Accumulator, AggregateUDF, AggregateUDFImpl, ColumnarValue, EmitTo, GroupsAccumulator,
-        Signature, TypeSignature, Volatility,
+        Accumulator, AggregateUDF, AggregateUDFImpl, EmitTo, GroupsAccumulator, Signature,
+        TypeSignature, Volatility,
         function::{AccumulatorArgs, StateFieldsArgs},
     },
-    physical_plan::PhysicalExpr,
 };
-use stretch_core::{Degree, MAX_DEGREE, MAX_TERMS};
+use stretch_core::Degree;
 
 use crate::{
     about::About,
-    agreement::{self, Agreements},
     answer::{answers, fields},
     one::{One, state_of_each_row, states},
-    triangles::{Outcome, Triangles},
+    state::Outcome,
+    triangles::Triangles,
 };
 
-/// Numbers of terms of the most frequent fits, used as capacities.
+/// Numbers of terms of the fits.
 const LINE: usize = Degree::LINE.terms();
 const POLY13: usize = Degree::POLY13.terms();
 
@@ -35,10 +33,8 @@ const POLY13: usize = Degree::POLY13.terms();
 enum Kind {
     Poly13,
     Line,
-    PolyIj,
     State,
     Merge,
-    Agreement,
 }
 
 impl Kind {
@@ -46,27 +42,19 @@ impl Kind {
         match self {
             Self::Poly13 => "poly13_fit",
             Self::Line => "linear_fit",
-            Self::PolyIj => "polyij_fit",
             Self::State => "poly13_state",
             Self::Merge => "poly13_merge",
-            Self::Agreement => "agreement",
         }
     }
 
     fn signature(self) -> Signature {
-        use DataType::{Binary, BinaryView, Float64, Int64, LargeBinary};
+        use DataType::{Binary, BinaryView, Float64, LargeBinary};
         let types = match self {
             Self::Poly13 | Self::State => TypeSignature::Exact(vec![Float64; 3]),
-            Self::Line | Self::Agreement => TypeSignature::Exact(vec![Float64; 2]),
-            Self::PolyIj => TypeSignature::Exact(vec![Int64, Int64, Float64, Float64, Float64]),
+            Self::Line => TypeSignature::Exact(vec![Float64; 2]),
             Self::Merge => TypeSignature::Uniform(1, vec![BinaryView, Binary, LargeBinary]),
         };
         Signature::new(types, Volatility::Immutable)
-    }
-
-    /// Returns the number of arguments before the columns.
-    fn literals(self) -> usize {
-        if self == Self::PolyIj { 2 } else { 0 }
     }
 }
 
@@ -79,8 +67,7 @@ struct Function {
 
 /// Returns all aggregate functions of this file.
 pub(crate) fn functions() -> impl Iterator<Item = Arc<AggregateUDF>> {
-    use Kind::{Agreement, Line, Merge, Poly13, PolyIj, State};
-    [Poly13, Line, PolyIj, State, Merge, Agreement].into_iter().map(|kind| {
+    [Kind::Poly13, Kind::Line, Kind::State, Kind::Merge].into_iter().map(|kind| {
         let signature = kind.signature();
         Arc::new(AggregateUDF::new_from_impl(Function { kind, signature }))
     })
@@ -88,27 +75,10 @@ pub(crate) fn functions() -> impl Iterator<Item = Arc<AggregateUDF>> {
 
 impl Function {
     fn groups(&self, args: &AccumulatorArgs) -> Result<Box<dyn GroupsAccumulator + Sync>> {
-        if self.kind == Kind::Agreement {
-            return Ok(Box::<Agreements>::default());
-        }
-        let degree = self.degree(args)?;
-        Ok(match degree.terms() {
-            terms if terms <= LINE => Box::new(self.fits::<LINE>(degree, args)?),
-            terms if terms <= POLY13 => Box::new(self.fits::<POLY13>(degree, args)?),
-            _ => Box::new(self.fits::<MAX_TERMS>(degree, args)?),
+        Ok(match self.kind {
+            Kind::Line => Box::new(self.fits::<LINE>(Degree::LINE, args)?),
+            _ => Box::new(self.fits::<POLY13>(Degree::POLY13, args)?),
         })
-    }
-
-    fn degree(&self, args: &AccumulatorArgs) -> Result<Degree> {
-        match self.kind {
-            Kind::PolyIj => {
-                let (rate, signal) = (power(&args.exprs[0], "i")?, power(&args.exprs[1], "j")?);
-                Degree::new(rate, signal)
-                    .map_err(|error| plan_datafusion_err!("polyij_fit: {error}"))
-            }
-            Kind::Line => Ok(Degree::LINE),
-            _ => Ok(Degree::POLY13),
-        }
     }
 
     fn fits<const TERMS: usize>(
@@ -118,29 +88,12 @@ impl Function {
     ) -> Result<Fits<TERMS>> {
         let about = match self.kind {
             Kind::Merge => About::new(&[args.expr_fields[0].clone(), args.expr_fields[0].clone()])?,
-            kind => About::new(&args.expr_fields[kind.literals()..])?,
+            _ => About::new(args.expr_fields)?,
         };
         let sides = if self.kind == Kind::Line { 1 } else { 2 };
         let triangles = Triangles::new(degree, sides, &about)
             .map_err(|error| plan_datafusion_err!("{}: {error}", self.kind.name()))?;
         Ok(Fits { kind: self.kind, triangles })
-    }
-}
-
-/// Returns a power that is written as a literal in the query.
-fn power(expr: &Arc<dyn PhysicalExpr>, name: &str) -> Result<u8> {
-    // A literal can be evaluated without rows. Evaluating it also works for expression types of
-    // another library.
-    let nothing = RecordBatch::new_empty(Arc::new(Schema::empty()));
-    match expr.evaluate(&nothing) {
-        Ok(ColumnarValue::Scalar(ScalarValue::Int64(Some(power))))
-            if (0..=MAX_DEGREE as i64).contains(&power) =>
-        {
-            Ok(power as u8)
-        }
-        _ => Err(plan_datafusion_err!(
-            "polyij_fit: {name} is {expr}, but must be a number from 0 to {MAX_DEGREE} that is written in the query"
-        )),
     }
 }
 
@@ -156,7 +109,6 @@ impl AggregateUDFImpl for Function {
     fn return_type(&self, _: &[DataType]) -> Result<DataType> {
         Ok(match self.kind {
             Kind::State => DataType::Binary,
-            Kind::Agreement => DataType::Struct(agreement::fields()),
             _ => DataType::Struct(fields()),
         })
     }
@@ -196,12 +148,7 @@ struct Fits<const TERMS: usize> {
 impl<const TERMS: usize> Fits<TERMS> {
     fn bytes(&self, outcomes: &[Outcome<TERMS>]) -> ArrayRef {
         let mut builder = BinaryBuilder::new();
-        let mut state = Vec::new();
-        for outcome in outcomes {
-            state.clear();
-            self.triangles.write(&mut state, outcome);
-            builder.append_value(&state);
-        }
+        outcomes.iter().for_each(|outcome| builder.append_value(self.triangles.bytes(outcome)));
         Arc::new(builder.finish())
     }
 
@@ -231,7 +178,7 @@ impl<const TERMS: usize> GroupsAccumulator for Fits<TERMS> {
         if self.kind == Kind::Merge {
             return self.merge(values, groups, filter, total);
         }
-        let columns = values[self.kind.literals()..].iter().map(|array| as_float64_array(array));
+        let columns = values.iter().map(|array| as_float64_array(array));
         let columns = match columns.collect::<Result<Vec<_>>>()?[..] {
             // A line has no rate. The signal is passed in place of it, and is not used.
             [signal, reference] => [signal, signal, reference],

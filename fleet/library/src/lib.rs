@@ -1,7 +1,6 @@
 #![doc = include_str!("../README.md")]
 
 mod about;
-mod agreement;
 mod answer;
 mod estimate;
 mod fit;

@@ -1,36 +1,18 @@
-//! The stored bytes of a partial fit.
-//!
-//! All numbers are little-endian on every machine:
-//!
-//! ```text
-//! 4   magic "STRF"
-//! 1   version, 1
-//! 1   kind: 1 a line, 2 a surface a branch, 255 a refusal
-//! of a refusal: its sentence, UTF-8, to the end
-//! 1   degree in the rate        1   degree in the signal
-//! 8   rows left out
-//! 2   bytes of the text         n   text: JSON of the columns and of the rates' estimator
-//! then a side each (a line has one, a surface two: rate >= 0, rate < 0):
-//! 8   rows; nothing more of this side where it is 0
-//! 8   folds          8   centre          16  residual sum of squares, and its rounding
-//! 8 T (T + 1)/2      the upper triangle, by row, of T terms
-//! 8 T                Q^T z
-//! 48  least rate, signal, reference; greatest
-//! ```
+//! The stored bytes of a partial fit: `STRF`, the version, and a [`Content`] as postcard writes it.
 
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
 use stretch_core::Degree;
 use stretch_fit::{Factor, FactorSpec};
 
 /// The version of stored states that this release writes and reads.
-pub const STATE_VERSION: u8 = 1;
+pub const STATE_VERSION: u8 = 2;
 
 const MAGIC: &[u8; 4] = b"STRF";
-const REFUSAL: u8 = 255;
 
 /// Smallest and largest rate, signal and reference of some rows.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Span {
     /// Smallest rate, signal and reference.
     pub least: [f64; 3],
@@ -83,11 +65,35 @@ pub(crate) struct Partial<const TERMS: usize> {
     pub sides: [Option<(Factor<f64, TERMS>, Span)>; 2],
 }
 
+/// The outcome of a group: a partial fit, or the reason for a refusal.
+pub(crate) type Outcome<const TERMS: usize> = Result<Partial<TERMS>, Box<str>>;
+
 /// The content of a state.
-#[derive(Debug, Clone)]
-pub(crate) enum Stored<const TERMS: usize> {
-    Partial(Partial<TERMS>),
-    Refusal(String),
+#[derive(Debug, Serialize, Deserialize)]
+enum Content<'a> {
+    /// The sentence of a fit that was already refused.
+    Refusal(&'a str),
+    Fit {
+        /// Degree in the rate and in the signal.
+        degree: [u8; 2],
+        left_out: u64,
+        /// JSON of the columns and of the estimator of the rates.
+        about: &'a str,
+        /// One side of a line, two of a surface; nothing of a side without rows.
+        sides: Vec<Option<Side>>,
+    },
+}
+
+/// A branch, or a line.
+#[derive(Debug, Serialize, Deserialize)]
+struct Side {
+    samples: u64,
+    folds: u64,
+    /// Centre, residual sum of squares and its rounding.
+    head: [f64; 3],
+    /// The upper triangle by row, then Q^T z.
+    triangle: Vec<f64>,
+    span: Span,
 }
 
 /// Why bytes are not a usable state.
@@ -120,12 +126,6 @@ pub enum StateError {
         /// Columns and rates of the states merged before.
         expected: String,
     },
-    /// A state that stores a refusal.
-    #[error("{sentence}")]
-    Refused {
-        /// The reason for the refusal.
-        sentence: String,
-    },
     /// Too few or too many bytes, or numbers that no fit can produce.
     #[error("it is damaged ({what}): compute it again from its rows")]
     Damaged {
@@ -134,93 +134,64 @@ pub enum StateError {
     },
 }
 
-fn name(kind: u8, degree: Degree) -> String {
-    if kind == 1 { "a line".to_owned() } else { degree.to_string() }
+fn name(sides: usize, degree: Degree) -> String {
+    if sides == 1 { "a line".to_owned() } else { degree.to_string() }
 }
 
-/// Appends the state of a partial fit; `kind` is the number of its sides.
+/// Returns the state of a fit with this number of sides.
 pub(crate) fn write<const TERMS: usize>(
-    out: &mut Vec<u8>,
-    kind: u8,
+    sides: usize,
     degree: Degree,
-    partial: &Partial<TERMS>,
-) {
-    out.extend_from_slice(MAGIC);
-    out.extend_from_slice(&[STATE_VERSION, kind, degree.rate(), degree.volts()]);
-    out.extend_from_slice(&partial.left_out.to_le_bytes());
-    let about = partial.about.as_bytes();
-    // A text of names and an estimator. A text that is too long is dropped.
-    let about = if about.len() <= usize::from(u16::MAX) { about } else { &[] };
-    out.extend_from_slice(&(about.len() as u16).to_le_bytes());
-    out.extend_from_slice(about);
-    for side in partial.sides.iter().take(kind.into()) {
-        let Some((factor, span)) = side else {
-            out.extend_from_slice(&0_u64.to_le_bytes());
-            continue;
-        };
-        let spec = factor.spec();
-        out.extend_from_slice(&spec.samples.to_le_bytes());
-        out.extend_from_slice(&spec.folds.to_le_bytes());
-        let terms = degree.terms();
-        let rows = spec.r[..terms].iter().enumerate();
-        let triangle = rows.flat_map(|(k, row)| &row[k..terms]);
-        let head = [spec.centre, spec.residual, spec.residual_rounding];
-        let numbers = head.iter().chain(triangle).chain(&spec.q[..terms]);
-        for x in numbers.chain(&span.least).chain(&span.most) {
-            out.extend_from_slice(&x.to_le_bytes());
-        }
-    }
+    outcome: &Outcome<TERMS>,
+) -> Vec<u8> {
+    let content = match outcome {
+        Err(sentence) => Content::Refusal(sentence),
+        Ok(partial) => Content::Fit {
+            degree: [degree.rate(), degree.volts()],
+            left_out: partial.left_out,
+            about: &partial.about,
+            sides: partial.sides[..sides].iter().map(|side| side.as_ref().map(Side::of)).collect(),
+        },
+    };
+    let mut bytes = MAGIC.to_vec();
+    bytes.push(STATE_VERSION);
+    // Memory takes every number.
+    postcard::to_extend(&content, bytes).unwrap_or_default()
 }
 
-/// Appends the state of a fit that was already refused.
-pub(crate) fn write_refusal(out: &mut Vec<u8>, sentence: &str) {
-    out.extend_from_slice(MAGIC);
-    out.extend_from_slice(&[STATE_VERSION, REFUSAL]);
-    out.extend_from_slice(sentence.as_bytes());
-}
-
-/// Reads a state, which must have this `kind` and `degree`. If its text equals `known`, the
-/// allocation of `known` is shared.
+/// Reads a state, which must have this number of sides and this degree. If its text equals `known`,
+/// the allocation of `known` is shared.
 pub(crate) fn read<const TERMS: usize>(
     bytes: &[u8],
-    kind: u8,
+    sides: usize,
     degree: Degree,
     known: &Arc<str>,
-) -> Result<Stored<TERMS>, StateError> {
+) -> Result<Outcome<TERMS>, StateError> {
     let rest = bytes.strip_prefix(MAGIC).ok_or(StateError::NoState)?;
-    let mut from = Bytes(rest);
-    let [version, found] = from.take()?;
-    if version != STATE_VERSION {
-        return Err(StateError::Version { found: version });
+    let (&found, rest) = rest.split_first().ok_or_else(|| damaged("it ends too early"))?;
+    if found != STATE_VERSION {
+        return Err(StateError::Version { found });
     }
-    if found == REFUSAL {
-        return Ok(Stored::Refusal(String::from_utf8_lossy(from.0).into_owned()));
-    }
-    let [rate, volts] = from.take()?;
-    let its = Degree::new(rate, volts).map_err(|_| damaged("its degree"))?;
-    if !matches!(found, 1 | 2) {
-        return Err(damaged("its kind"));
-    }
-    if found != kind || its != degree {
-        let (found, expected) = (name(found, its), name(kind, degree));
-        return Err(StateError::Kind { found, expected });
-    }
-    let left_out = from.count()?;
-    let length = u16::from_le_bytes(from.take()?);
-    let text = from.slice(length.into())?;
-    let about = if text == known.as_bytes() {
-        known.clone()
-    } else {
-        Arc::from(std::str::from_utf8(text).map_err(|_| damaged("its text"))?)
-    };
-    let mut sides = [None, None];
-    for side in sides.iter_mut().take(kind.into()) {
-        *side = from.side(degree)?;
-    }
-    if !from.0.is_empty() {
+    let (content, rest) = postcard::take_from_bytes::<Content<'_>>(rest)
+        .map_err(|_| damaged("its bytes are no fit"))?;
+    if !rest.is_empty() {
         return Err(damaged("bytes after its end"));
     }
-    Ok(Stored::Partial(Partial { left_out, about, sides }))
+    let ([rate, volts], left_out, about, stored) = match content {
+        Content::Refusal(sentence) => return Ok(Err(sentence.into())),
+        Content::Fit { degree, left_out, about, sides } => (degree, left_out, about, sides),
+    };
+    let its = Degree::new(rate, volts).map_err(|_| damaged("its degree"))?;
+    if its != degree || stored.len() != sides {
+        let (found, expected) = (name(stored.len(), its), name(sides, degree));
+        return Err(StateError::Kind { found, expected });
+    }
+    let about = if *about == **known { known.clone() } else { Arc::from(about) };
+    let mut sides = [None, None];
+    for (side, stored) in sides.iter_mut().zip(stored) {
+        *side = stored.map(|stored| stored.read(degree)).transpose()?;
+    }
+    Ok(Ok(Partial { left_out, about, sides }))
 }
 
 /// Returns the triangular factors of a state written by `poly13_state`: first of rows with a rate
@@ -232,10 +203,10 @@ pub(crate) fn read<const TERMS: usize>(
 pub fn poly13_factors(
     state: &[u8],
 ) -> Result<[Option<Factor<f64, { Degree::POLY13.terms() }>>; 2], StateError> {
-    match read::<{ Degree::POLY13.terms() }>(state, 2, Degree::POLY13, &Arc::from(""))? {
-        Stored::Partial(partial) => Ok(partial.sides.map(|side| side.map(|(factor, _)| factor))),
-        Stored::Refusal(sentence) => {
-            Err(StateError::Kind { found: sentence, expected: Degree::POLY13.to_string() })
+    match read(state, 2, Degree::POLY13, &Arc::from(""))? {
+        Ok(partial) => Ok(partial.sides.map(|side| side.map(|(factor, _)| factor))),
+        Err(sentence) => {
+            Err(StateError::Kind { found: sentence.into(), expected: Degree::POLY13.to_string() })
         }
     }
 }
@@ -244,60 +215,33 @@ fn damaged(what: &'static str) -> StateError {
     StateError::Damaged { what }
 }
 
-/// The remaining bytes.
-struct Bytes<'a>(&'a [u8]);
-
-impl<'a> Bytes<'a> {
-    fn slice(&mut self, length: usize) -> Result<&'a [u8], StateError> {
-        let (taken, rest) =
-            self.0.split_at_checked(length).ok_or_else(|| damaged("it ends too early"))?;
-        self.0 = rest;
-        Ok(taken)
+impl Side {
+    fn of<const TERMS: usize>((factor, span): &(Factor<f64, TERMS>, Span)) -> Self {
+        let FactorSpec { degree, centre, r, q, residual, residual_rounding, samples, folds } =
+            factor.spec();
+        let terms = degree.terms();
+        let rows = r[..terms].iter().enumerate().flat_map(|(k, row)| &row[k..terms]);
+        let triangle = rows.chain(&q[..terms]).copied().collect();
+        Self { samples, folds, head: [centre, residual, residual_rounding], triangle, span: *span }
     }
 
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], StateError> {
-        let (taken, rest) =
-            self.0.split_first_chunk().ok_or_else(|| damaged("it ends too early"))?;
-        self.0 = rest;
-        Ok(*taken)
-    }
-
-    fn count(&mut self) -> Result<u64, StateError> {
-        self.take().map(u64::from_le_bytes)
-    }
-
-    fn fill(&mut self, out: &mut [f64]) -> Result<(), StateError> {
-        let bytes = self.slice(8 * out.len())?;
-        for (place, bytes) in out.iter_mut().zip(bytes.as_chunks().0) {
-            *place = f64::from_le_bytes(*bytes);
-        }
-        Ok(())
-    }
-
-    fn side<const TERMS: usize>(
-        &mut self,
+    fn read<const TERMS: usize>(
+        self,
         degree: Degree,
-    ) -> Result<Option<(Factor<f64, TERMS>, Span)>, StateError> {
-        let samples = self.count()?;
-        if samples == 0 {
-            return Ok(None);
-        }
-        let folds = self.count()?;
-        let mut head = [0.0; 3];
-        self.fill(&mut head)?;
-        let [centre, residual, residual_rounding] = head;
-        let (mut r, mut q) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
+    ) -> Result<(Factor<f64, TERMS>, Span), StateError> {
+        let Self { samples, folds, head: [centre, residual, residual_rounding], triangle, span } =
+            self;
         let terms = degree.terms().min(TERMS);
-        for (k, row) in r[..terms].iter_mut().enumerate() {
-            self.fill(&mut row[k..terms])?;
+        let (mut r, mut q) = ([[0.0; TERMS]; TERMS], [0.0; TERMS]);
+        let places = r[..terms].iter_mut().enumerate().flat_map(|(k, row)| &mut row[k..terms]);
+        let places: Vec<&mut f64> = places.chain(&mut q[..terms]).collect();
+        if samples == 0 || places.len() != triangle.len() {
+            return Err(damaged("the number of its numbers"));
         }
-        self.fill(&mut q[..terms])?;
-        let mut span = Span::EMPTY;
-        self.fill(&mut span.least)?;
-        self.fill(&mut span.most)?;
+        places.into_iter().zip(triangle).for_each(|(place, x)| *place = x);
         let spec = FactorSpec { degree, centre, r, q, residual, residual_rounding, samples, folds };
         let factor = Factor::new(spec).map_err(|_| damaged("a number that is not finite"))?;
         let ordered = span.least.iter().zip(&span.most).all(|(a, b)| a <= b && (b - a).is_finite());
-        if ordered { Ok(Some((factor, span))) } else { Err(damaged("its ranges")) }
+        if ordered { Ok((factor, span)) } else { Err(damaged("its ranges")) }
     }
 }

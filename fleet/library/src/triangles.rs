@@ -13,7 +13,7 @@ use stretch_fit::{Factor, FitError, SurfaceAccumulator};
 
 use crate::{
     about::About,
-    state::{Partial, Span, StateError, Stored, read, write, write_refusal},
+    state::{Outcome, Partial, Span, StateError, read, write},
 };
 
 /// Number of rows of a group and branch that are collected before they are folded into the factor
@@ -47,7 +47,7 @@ struct Group {
 /// Partial fits of all groups. Index `group * sides + side` holds a side of a group.
 ///
 /// A group needs a triangle per side and, once it receives rows, `3 ROWS` numbers per side: 7.4 kB
-/// for poly13, 14 kB for the largest surface. All groups share the work space for folding.
+/// for poly13. All groups share the work space for folding.
 #[derive(Debug)]
 pub(crate) struct Triangles<const TERMS: usize> {
     degree: Degree,
@@ -60,9 +60,6 @@ pub(crate) struct Triangles<const TERMS: usize> {
     /// Collected rows, with the same indices; empty until rows arrive.
     waiting: Vec<Waiting>,
 }
-
-/// The outcome of a group: a partial fit, or the reason for a refusal.
-pub(crate) type Outcome<const TERMS: usize> = std::result::Result<Partial<TERMS>, Box<str>>;
 
 impl<const TERMS: usize> Triangles<TERMS> {
     /// Creates fits without any group, for a line (one side) or a surface per branch (two sides).
@@ -199,17 +196,15 @@ impl<const TERMS: usize> Triangles<TERMS> {
             let dropped = filter.is_some_and(|kept| !(kept.is_valid(row) && kept.value(row)));
             let Some(state) = state.filter(|_| !dropped) else { continue };
             let known = &self.groups[group].about;
-            let merged = match read(state, self.sides as u8, self.degree, known) {
-                Ok(Stored::Partial(partial)) => self.merge(group, &partial),
-                Ok(Stored::Refusal(sentence)) => Err(StateError::Refused { sentence }),
-                Err(error) => Err(error),
+            let merged = match read(state, self.sides, self.degree, known) {
+                Ok(Ok(partial)) => self
+                    .merge(group, &partial)
+                    .map_err(|error| format!("a stored state cannot be merged: {error}").into()),
+                Ok(Err(sentence)) => Err(sentence),
+                Err(error) => Err(format!("a stored state cannot be merged: {error}").into()),
             };
-            if let Err(error) = merged {
-                let sentence = match error {
-                    StateError::Refused { sentence } => sentence,
-                    error => format!("a stored state cannot be merged: {error}"),
-                };
-                self.groups[group].refused.get_or_insert(sentence.into());
+            if let Err(sentence) = merged {
+                self.groups[group].refused.get_or_insert(sentence);
             }
         }
     }
@@ -274,11 +269,8 @@ impl<const TERMS: usize> Triangles<TERMS> {
     }
 
     /// Serializes the outcome of a group.
-    pub(crate) fn write(&self, out: &mut Vec<u8>, outcome: &Outcome<TERMS>) {
-        match outcome {
-            Ok(partial) => write(out, self.sides as u8, self.degree, partial),
-            Err(sentence) => write_refusal(out, sentence),
-        }
+    pub(crate) fn bytes(&self, outcome: &Outcome<TERMS>) -> Vec<u8> {
+        write(self.sides, self.degree, outcome)
     }
 
     /// Returns the memory in use, bytes.

@@ -4,13 +4,12 @@ use std::{collections::BTreeSet, path::PathBuf};
 
 use anyhow::{Context, ensure};
 use chrono::NaiveDate;
-use serde::Serialize;
 
 use crate::{
     answers::{flat, table, write_records},
-    lake::{Refused, write_parquet},
+    lake::write_parquet,
     lock::{Lock, RECORDS_DEPTH},
-    show::{say, say_json, warn_of},
+    show::{say, warn_of},
     sql::{On, ask_in_shares},
     states::bring_up,
 };
@@ -40,18 +39,6 @@ pub(crate) struct Args {
     /// Last day
     #[arg(long)]
     to: Option<NaiveDate>,
-    /// Print JSON instead of a table
-    #[arg(long)]
-    json: bool,
-}
-
-/// Summary of the run.
-#[derive(Debug, Serialize)]
-struct Summary {
-    months_computed: usize,
-    sensors: usize,
-    records: usize,
-    refused: Vec<Refused>,
 }
 
 pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
@@ -87,10 +74,6 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
     let _out = Lock::of(&args.out, RECORDS_DEPTH)?;
     let (records, refused) = write_records(&lake, &answer, &args.out)?;
     write_parquet(&args.out.join("calibrations.parquet"), &answer, Vec::new(), None)?;
-    let summary = Summary { months_computed, sensors: answer.num_rows(), records, refused };
-    if args.json {
-        return say_json(&summary);
-    }
     let first = answer.slice(0, SHOWN.min(answer.num_rows()));
     let narrow = ["site", "rig", "sensor", "rows", "rows_left_out", "rmse", "refused"];
     let places = narrow.iter().filter_map(|name| first.schema().index_of(name).ok());
@@ -101,11 +84,11 @@ pub(crate) async fn run(args: Args) -> anyhow::Result<()> {
             answer.num_rows() - SHOWN
         ))?;
     }
-    warn_of("no calibration of", &summary.refused);
+    warn_of("no calibration of", &refused);
     say(format!(
         "{}: {records} calibrations of {} sensors, {} refused; {months_computed} months of rigs computed now",
         args.out.display(),
-        summary.sensors,
-        summary.refused.len()
+        answer.num_rows(),
+        refused.len()
     ))
 }

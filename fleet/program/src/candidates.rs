@@ -36,36 +36,35 @@ fn candidate(source: &Source) -> Result<Candidate<'_>, String> {
     Ok(Candidate { source, place, digest })
 }
 
-/// Returns for each file the reason why it is a byte-identical copy of another one, or `None` if it
-/// is not. Of several identical files, one is the original: the one at the place where the lake
-/// already has it, otherwise the first of the list.
-pub(crate) fn copies(all: &[Candidate<'_>], there: &[LakeFile]) -> Vec<Option<String>> {
-    let in_lake: HashMap<&str, &LakeFile> =
-        there.iter().map(|file| (file.footer.digest.as_str(), file)).collect();
-    let mut counting: HashMap<&str, &Path> = HashMap::new();
-    for one in all {
-        let counts = in_lake.get(one.digest.as_str()).is_none_or(|file| file.place == *one.place);
-        if counts {
-            counting.entry(&one.digest).or_insert(one.source.path.as_path());
-        }
+/// The files of a lake and of this run, by the digest of their bytes.
+pub(crate) struct Seen<'a> {
+    lake: HashMap<&'a str, &'a Place>,
+    new: HashMap<String, &'a Path>,
+}
+
+impl<'a> Seen<'a> {
+    pub(crate) fn new(files: &'a [LakeFile]) -> Self {
+        let lake = files.iter().map(|file| (file.footer.digest.as_str(), &file.place)).collect();
+        Self { lake, new: HashMap::new() }
     }
-    let why = |one: &Candidate<'_>| {
-        let counts = counting.get(one.digest.as_str()).copied();
-        match in_lake.get(one.digest.as_str()) {
-            _ if counts == Some(one.source.path.as_path()) => None,
-            Some(file) if file.place != *one.place => Some(format!(
-                "the lake already has it as a trial of {}, but here it is given as a trial of {}: remove it from the lake first, or leave it there",
-                file.place, one.place
-            )),
-            _ => counts.map(|path| {
-                format!(
-                    "it has the same bytes as {}, which is used: a trial that is used twice would have twice its weight",
-                    path.display()
-                )
-            }),
+
+    /// Returns the reason why a file is a byte-identical copy of another one, or `None` if it is not. Of several
+    /// identical files, one is the original: the one at the place where the lake already has it, otherwise the first.
+    pub(crate) fn copy(&mut self, one: &Candidate<'a>) -> Option<String> {
+        if let Some(place) = self.lake.get(one.digest.as_str()).filter(|place| **place != one.place)
+        {
+            return Some(format!(
+                "the lake already has it as a trial of {place}, but here it is given as a trial of {}: remove it from the lake first, or leave it there",
+                one.place
+            ));
         }
-    };
-    all.iter().map(why).collect()
+        let path = self.new.insert(one.digest.clone(), &one.source.path)?;
+        self.new.insert(one.digest.clone(), path);
+        Some(format!(
+            "it has the same bytes as {}, which is used: a trial that is used twice would have twice its weight",
+            path.display()
+        ))
+    }
 }
 
 /// The trials of a lake, including those written in this run.

@@ -13,7 +13,7 @@ use crate::{
     data_sets::{By, Name, data_sets, lake_with_trials, read, trials},
     lake::{Lake, LakeFile, digest, write_parquet},
     lock::remove_abandoned,
-    show::{bar, say, say_json},
+    show::{bar, say},
 };
 
 /// Diagnose for every sensor and day which effect causes a gap
@@ -47,9 +47,6 @@ pub(crate) struct Args {
     /// Seed of the random numbers for the intervals
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Print JSON instead of a table
-    #[arg(long)]
-    json: bool,
 }
 
 fn share(text: &str) -> Result<(usize, usize), String> {
@@ -90,12 +87,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         .collect();
     let all = read(&done)?;
     write_parquet(&args.out.join("verdicts.parquet"), &all, Vec::new(), None)?;
-    if args.json {
-        let counts = serde_json::json!({
-            "data_sets": sets.len(), "diagnosed_now": open.len(), "verdicts": all.num_rows()
-        });
-        return say_json(&counts);
-    }
     say(table(&all)?)?;
     say(format!(
         "{}: {} of {} data sets have a verdict, {} diagnosed now",

@@ -13,13 +13,14 @@ use datafusion::arrow::{
     datatypes::{DataType, Date32Type},
 };
 use rayon::prelude::*;
+use stretch_problem::q_values;
 
 use crate::{
     answers::table,
     lake::write_parquet,
     lock::remove_abandoned,
-    month_test::{Compared, Day, compare, q_values},
-    show::{bar, say, say_json},
+    month_test::{Compared, Day, compare},
+    show::{bar, say},
     sql::On,
     states::bring_up,
 };
@@ -49,9 +50,6 @@ pub(crate) struct Args {
     /// Output file in Parquet, one row per sensor
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Print JSON instead of a table
-    #[arg(long)]
-    json: bool,
 }
 
 /// Parses a month and returns its first day.
@@ -192,14 +190,8 @@ fn told(rows: &[Row], level: f64) -> anyhow::Result<RecordBatch> {
 
 fn tell(args: &Args, rows: &[Row], batch: &RecordBatch) -> anyhow::Result<()> {
     let has_moved = |row: &&Row| row.q.is_some_and(|q| q <= args.false_discoveries);
-    let moved = rows.iter().filter(has_moved);
     let refused = rows.iter().filter(|row| row.compared.is_err()).count();
-    if args.json {
-        let names: Vec<String> = moved.map(|row| row.gauge.name.join("/")).collect();
-        let all = serde_json::json!({ "sensors": rows.len(), "refused": refused, "moved": names });
-        return say_json(&all);
-    }
-    let count = moved.count();
+    let count = rows.iter().filter(has_moved).count();
     let shown: BooleanArray =
         rows.iter().map(|row| Some(has_moved(&row) || row.compared.is_err())).collect();
     let shown = filter_record_batch(batch, &shown)?;

@@ -9,19 +9,18 @@ use std::{
 
 use anyhow::{Context, bail, ensure};
 use rayon::prelude::*;
-use serde::Serialize;
 use stretch_calibrate::{parse_rate, rated};
 use stretch_core::RateEstimator;
-use stretch_data::{Trial, unit};
+use stretch_data::{Split, Trial, TrialKind, unit};
 use stretch_recording::ReadOptions;
 
 use crate::{
-    candidates::{Candidate, Known, candidates, copies},
+    candidates::{Candidate, Known, Seen, candidates},
     lake::{
         About, Footer, Lake, LakeFile, Refused, Samples, accept, digest, refuse, set_aside, write,
     },
     lock::Lock,
-    show::{bar, say, say_json, warn_of},
+    show::{bar, say, warn_of},
     sources::{Source, Where, sources},
 };
 
@@ -62,13 +61,10 @@ pub(crate) struct Args {
     /// Column of the time; its last part may be ms, us or ns
     #[arg(long, default_value = "time_s", value_name = "COL")]
     time: String,
-    /// Print JSON instead of sentences
-    #[arg(long)]
-    json: bool,
 }
 
 /// Summary of the run.
-#[derive(Debug, Default, Serialize)]
+#[derive(Debug, Default)]
 struct Summary {
     written: usize,
     rows: u64,
@@ -102,10 +98,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         known: Mutex::new(Known::of(&there.files)),
     };
     let (all, mut refused) = candidates(&sources);
-    let copies = copies(&all, &there.files);
+    let mut seen = Seen::new(&there.files);
     let mut by_gauge: BTreeMap<[String; 3], Vec<Candidate<'_>>> = BTreeMap::new();
-    for (one, why) in all.into_iter().zip(copies) {
-        match why {
+    for one in all {
+        match seen.copy(&one) {
             Some(why) => refused.push((&one.source.path, why)),
             None => by_gauge.entry(one.place.gauge().map(str::to_owned)).or_default().push(one),
         }
@@ -136,26 +132,17 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     })?;
     bar.finish_and_clear();
     let summary = summary.into_inner().map_err(|_| anyhow::anyhow!("a thread has failed"))?;
-    tell(&args, &summary)?;
-    let (refused, lake) = (summary.refused.len(), args.lake.display());
+    warn_of("refused:", &summary.refused);
+    let Summary { written, rows, there_already, refused } = summary;
+    let (refused, lake) = (refused.len(), args.lake.display());
+    say(format!(
+        "{lake}: {written} trials written ({rows} rows), {there_already} there already, {refused} refused"
+    ))?;
     ensure!(
         refused == 0,
         "{refused} files were not added to the lake: {lake}/refused contains the reason for each"
     );
     Ok(())
-}
-
-fn tell(args: &Args, summary: &Summary) -> anyhow::Result<()> {
-    if args.json {
-        return say_json(summary);
-    }
-    warn_of("refused:", &summary.refused);
-    let Summary { written, rows, there_already, refused } = summary;
-    say(format!(
-        "{}: {written} trials written ({rows} rows), {there_already} there already, {} refused",
-        args.lake.display(),
-        refused.len()
-    ))
 }
 
 impl Args {
@@ -242,9 +229,17 @@ impl Ingest<'_> {
         let path = path.join(format!("{}.parquet", &digest[..16]));
         let read = source.read(&self.options).map_err(anyhow::Error::from);
         let made = read.and_then(|recording| {
-            let notes = recording.notes;
-            let (footer, samples) = self.samples(recording.trial, source, *rest)?;
-            Ok((Footer { notes, digest: digest.clone(), ..footer }, samples))
+            let (footer, samples) = prepared(self.about, recording.trial, self.rest(*rest)?)?;
+            let footer = Footer {
+                kind: source.kind(),
+                split: source.split(),
+                start_s: source.start_s(),
+                source: source.path.display().to_string(),
+                digest: digest.clone(),
+                notes: recording.notes,
+                ..footer
+            };
+            Ok((footer, samples))
         });
         let (footer, samples) = match made {
             Ok(made) => made,
@@ -264,81 +259,78 @@ impl Ingest<'_> {
         Ok(Done::Written(rows))
     }
 
-    /// Returns the rows and the description of a trial. `known` is the sensor's rest length, if the
-    /// lake has it.
-    fn samples(
-        &self,
-        trial: Trial,
-        source: &Source,
-        known: Option<f64>,
-    ) -> anyhow::Result<(Footer, Samples)> {
-        let About { signal, reference, rate, .. } = self.about;
-        let of_samples = samples_digest(&trial);
-        let reserved =
-            ["trial", "rate", "is_bridged", "contraction", "site", "rig", "sensor", "date"];
-        let others: Vec<&str> = trial
-            .channels
-            .iter()
-            .map(|channel| channel.name.as_str())
-            .filter(|name| name != signal && (name == reference || !reserved.contains(name)))
-            .collect();
-        let names: Vec<String> = std::iter::once(signal.as_str())
-            .chain(others.iter().copied())
-            .map(str::to_owned)
-            .collect();
-        let rated = rated(&trial, signal, &others, *rate, Some(self.about.sample_rate()?))?;
-        let period_s = trial.rate_hz().map_or(1.0 / self.about.sample_rate_hz, |hz| 1.0 / hz);
-        let mut samples = Samples {
-            channels: names.iter().map(|name| (name.clone(), Vec::new())).collect(),
-            ..Samples::default()
-        };
-        for part in rated.parts {
-            let begin_s = trial.time_s[0] + part.even.begin_s;
-            samples.time_s.extend((0..part.even.len()).map(|i| begin_s + i as f64 * period_s));
-            samples.is_bridged.extend(&part.even.is_lost);
-            for ((_, values), column) in samples.channels.iter_mut().zip(part.even.columns) {
-                values.extend(column);
-            }
-            samples.rate.extend(part.rate);
-        }
-        let mut rest = None;
-        if self.about.is_contraction {
-            let own = samples.channels.iter().find(|(name, _)| name == reference);
-            let lengths = own.map_or(&[][..], |(_, values)| values);
-            if let (Some(known), Some(given)) = (known, self.rest_length)
-                && known != given
-            {
-                bail!(
-                    "the rest length of its sensor is {known} in the lake, but --rest-length is {given}, and one fit cannot use both: \
-                     leave out --rest-length"
-                );
-            }
-            let longest = || lengths.iter().copied().fold(f64::MIN, f64::max);
-            let own = known.or(self.rest_length).unwrap_or_else(longest);
-            ensure!(
-                own > 0.0,
-                "the greatest {reference} is {own}, but a rest length must be above 0"
+    /// Returns the length at a contraction of zero, if the lake (`known`) or the user states it.
+    fn rest(&self, known: Option<f64>) -> anyhow::Result<Option<f64>> {
+        if let (Some(known), Some(given)) = (known, self.rest_length)
+            && known != given
+        {
+            bail!(
+                "the rest length of its sensor is {known} in the lake, but --rest-length is {given}, and one fit cannot use both: \
+                 leave out --rest-length"
             );
-            rest = Some(own);
-            samples.contraction = Some(lengths.iter().map(|x| (own - x) / own).collect());
         }
-        let units = names.iter().filter_map(|name| Some((name.clone(), unit(name)?.to_owned())));
-        let footer = Footer {
-            about: self.about.clone(),
-            units: units.collect(),
-            rest_length: rest,
-            dead_band: rated.dead_band,
-            kind: source.kind(),
-            split: source.split(),
-            start_s: source.start_s(),
-            source: source.path.display().to_string(),
-            samples: of_samples,
-            trial: trial.name,
-            digest: String::new(),
-            notes: Vec::new(),
-        };
-        Ok((footer, samples))
+        Ok(known.or(self.rest_length))
     }
+}
+
+/// Returns the rows of a trial and their description, without the source of the trial. `rest` is the length at a
+/// contraction of zero; by default, it is the greatest length of the trial.
+pub(crate) fn prepared(
+    about: &About,
+    trial: Trial,
+    rest: Option<f64>,
+) -> anyhow::Result<(Footer, Samples)> {
+    let About { signal, reference, rate, .. } = about;
+    let of_samples = samples_digest(&trial);
+    let reserved = ["trial", "rate", "is_bridged", "contraction", "site", "rig", "sensor", "date"];
+    let others: Vec<&str> = trial
+        .channels
+        .iter()
+        .map(|channel| channel.name.as_str())
+        .filter(|name| name != signal && (name == reference || !reserved.contains(name)))
+        .collect();
+    let names: Vec<String> =
+        std::iter::once(signal.as_str()).chain(others.iter().copied()).map(str::to_owned).collect();
+    let rated = rated(&trial, signal, &others, *rate, Some(about.sample_rate()?))?;
+    let period_s = trial.rate_hz().map_or(1.0 / about.sample_rate_hz, |hz| 1.0 / hz);
+    let mut samples = Samples {
+        channels: names.iter().map(|name| (name.clone(), Vec::new())).collect(),
+        ..Samples::default()
+    };
+    for part in rated.parts {
+        let begin_s = trial.time_s[0] + part.even.begin_s;
+        samples.time_s.extend((0..part.even.len()).map(|i| begin_s + i as f64 * period_s));
+        samples.is_bridged.extend(&part.even.is_lost);
+        for ((_, values), column) in samples.channels.iter_mut().zip(part.even.columns) {
+            values.extend(column);
+        }
+        samples.rate.extend(part.rate);
+    }
+    let mut rest_length = None;
+    if about.is_contraction {
+        let own = samples.channels.iter().find(|(name, _)| name == reference);
+        let lengths = own.map_or(&[][..], |(_, values)| values);
+        let own = rest.unwrap_or_else(|| lengths.iter().copied().fold(f64::MIN, f64::max));
+        ensure!(own > 0.0, "the greatest {reference} is {own}, but a rest length must be above 0");
+        rest_length = Some(own);
+        samples.contraction = Some(lengths.iter().map(|x| (own - x) / own).collect());
+    }
+    let units = names.iter().filter_map(|name| Some((name.clone(), unit(name)?.to_owned())));
+    let footer = Footer {
+        about: about.clone(),
+        units: units.collect(),
+        rest_length,
+        dead_band: rated.dead_band,
+        kind: TrialKind::Other,
+        split: Split::Fit,
+        start_s: 0.0,
+        source: String::new(),
+        samples: of_samples,
+        trial: trial.name,
+        digest: String::new(),
+        notes: Vec::new(),
+    };
+    Ok((footer, samples))
 }
 
 /// Returns a digest of time stamps and channels, independent of the file format.

@@ -9,15 +9,15 @@ use anyhow::{Context, ensure};
 use chrono::{Days, NaiveDate};
 use rayon::prelude::*;
 use serde::Serialize;
-use stretch_calibrate::rated;
 use stretch_core::{RateEstimator, SampleRate};
-use stretch_data::{Channel, Split, Trial, TrialKind};
+use stretch_data::{Channel, Trial, TrialKind};
 use stretch_gap::RandomGenerator;
 
 use crate::{
-    lake::{About, Footer, Place, Samples, digest, write},
+    ingest::prepared,
+    lake::{About, Footer, Place, digest, write},
     lock::Lock,
-    show::{bar, say, say_json},
+    show::{bar, say},
 };
 
 /// Write a lake of simulated sensors: S sensors by D days, one trial for each
@@ -64,9 +64,6 @@ pub(crate) struct Args {
     /// Seed
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Print JSON instead of a sentence
-    #[arg(long)]
-    json: bool,
 }
 
 /// Summary of the run, with the sensors that drift.
@@ -128,9 +125,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     let text = serde_json::to_string_pretty(&made)? + "\n";
     stretch_data::files::write_whole(lake.join("made.json"), |out| out.write_all(text.as_bytes()))?;
-    if args.json {
-        return say_json(&made);
-    }
     say(format!(
         "{}: {sensors} sensors by {days} days, {} rows written, {} sensors drift",
         lake.display(),
@@ -190,33 +184,8 @@ impl Gauge {
         if path.exists() {
             return Ok(0);
         }
-        let trial = self.trial(args, day);
-        let rated = rated(&trial, SIGNAL, &[REFERENCE], about.rate, None)?;
-        let mut samples = Samples { time_s: trial.time_s, ..Samples::default() };
-        for part in rated.parts {
-            samples.rate.extend(part.rate);
-            samples.is_bridged.extend(part.even.is_lost);
-        }
-        let names = trial.channels.into_iter().map(|channel| (channel.name, channel.values));
-        samples.channels = names.collect();
-        let lengths = &samples.channels[1].1;
-        samples.contraction = Some(lengths.iter().map(|x| (REST_MM - x) / REST_MM).collect());
-        let footer = Footer {
-            about: about.clone(),
-            trial: trial.name,
-            kind: TrialKind::Arbitrary,
-            split: Split::Fit,
-            start_s: 0.0,
-            units: [(SIGNAL, "v"), (REFERENCE, "mm")]
-                .map(|(a, b)| (a.to_owned(), b.to_owned()))
-                .into(),
-            rest_length: Some(REST_MM),
-            dead_band: rated.dead_band,
-            samples: digest.clone(),
-            source,
-            digest,
-            notes: Vec::new(),
-        };
+        let (footer, samples) = prepared(about, self.trial(args, day), Some(REST_MM))?;
+        let footer = Footer { kind: TrialKind::Arbitrary, source, digest, ..footer };
         write(&path, &footer, samples)?;
         Ok(args.rows.into())
     }

@@ -9,7 +9,7 @@ use stretch_sleeve::{Expected, Prior, Session, SleeveOptions};
 use crate::{
     data_sets::{By, Name, data_sets, lake_with_trials, trials},
     lake::{Lake, LakeFile, Refused},
-    show::{bar, say, say_json, warn_of},
+    show::{bar, say, warn_of},
 };
 
 /// Learn a prior for a new sensor from the sensors of a lake
@@ -34,9 +34,6 @@ pub(crate) struct Args {
     /// Which trials form a session
     #[arg(long, value_enum, default_value_t = By::Day)]
     by: By,
-    /// Print JSON instead of a table
-    #[arg(long)]
-    json: bool,
 }
 
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
@@ -56,12 +53,6 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let prior = Prior::learn(&sessions)?;
     let text = prior.to_json()?;
     stretch_data::files::write_whole(&args.out, |out| out.write_all(text.as_bytes()))?;
-    if args.json {
-        return say_json(&serde_json::json!({
-            "sessions": prior.sessions, "refused": refused, "signals": prior.signals,
-            "reference": prior.reference, "expected": prior.expected,
-        }));
-    }
     let number = |rmse: Option<f64>| rmse.map_or_else(|| "-".to_owned(), |x| format!("{x:.4}"));
     let unit = prior.unit();
     say(format!("RMSE on the end of each session if it is left out, {unit}:"))?;

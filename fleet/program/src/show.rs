@@ -10,7 +10,6 @@ use std::{
 };
 
 use indicatif::{ProgressBar, ProgressStyle};
-use serde::Serialize;
 
 use crate::lake::Refused;
 
@@ -23,11 +22,6 @@ pub(crate) fn say(text: impl std::fmt::Display) -> anyhow::Result<()> {
         Err(e) if e.kind() != io::ErrorKind::BrokenPipe => Err(e.into()),
         _ => Ok(()),
     }
-}
-
-/// Prints JSON.
-pub(crate) fn say_json(value: &impl Serialize) -> anyhow::Result<()> {
-    say(serde_json::to_string_pretty(value)?)
 }
 
 /// Writes a message to standard error.

@@ -27,8 +27,7 @@ use crate::{
 ///
 /// The table trials has the columns of all trials, and site, rig, sensor and date. Functions in
 /// addition to those of DataFusion: poly13_fit(rate, signal, reference), linear_fit(signal,
-/// reference), polyij_fit(i, j, rate, signal, reference), poly13_state(...) and poly13_merge(state),
-/// agreement(reference, estimate), strain_estimate(record, rate, signal).
+/// reference), poly13_state(...) and poly13_merge(state), strain_estimate(record, rate, signal).
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {

@@ -134,7 +134,7 @@ pub(super) fn values(runs: &[Run]) -> Vec<Heterogeneity> {
             differs: false,
         });
     }
-    let corrected = corrected(&out.iter().map(|h| h.p).collect::<Vec<_>>());
+    let corrected = q_values(&out.iter().map(|h| h.p).collect::<Vec<_>>());
     for (one, p) in out.iter_mut().zip(corrected) {
         (one.p_corrected, one.differs) = (p, p < RATE);
     }
@@ -160,7 +160,7 @@ pub(super) fn apart(runs: &[Run]) -> Vec<Apart> {
     }
     let p: Vec<f64> =
         asked.iter().map(|(_, _, z, _)| erfc(z.abs() / std::f64::consts::SQRT_2)).collect();
-    let found = asked.iter().zip(corrected(&p)).filter(|(_, p)| *p < RATE);
+    let found = asked.iter().zip(q_values(&p)).filter(|(_, p)| *p < RATE);
     let found: Vec<_> = found.map(|(one, _)| *one).collect();
     let of_run = |run: usize| {
         let own: Vec<_> = found.iter().filter(|(r, ..)| *r == run).collect();
@@ -174,9 +174,10 @@ pub(super) fn apart(runs: &[Run]) -> Vec<Apart> {
     (0..runs.len()).filter_map(of_run).collect()
 }
 
-/// Corrects probabilities for their number. Returns for each the least false discovery rate at
-/// which it would count as a discovery.
-fn corrected(p: &[f64]) -> Vec<f64> {
+/// Corrects probabilities for their number. Returns for each its q-value, the least false discovery
+/// rate at which it would count as a discovery (Benjamini and Hochberg). The tests have to be
+/// independent or positively correlated.
+pub fn q_values(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).collect();
     order.sort_by(|a, b| p[*b].total_cmp(&p[*a]));
     let (mut out, mut least) = (vec![1.0; p.len()], 1.0_f64);
@@ -197,8 +198,16 @@ mod tests {
         // The example of Benjamini and Hochberg: 4 of the 15 hypotheses are rejected.
         let p = [0.0001, 0.0004, 0.0019, 0.0095, 0.0201, 0.0278, 0.0298, 0.0344, 0.0459, 0.3240];
         let p = [&p[..], &[0.4262, 0.5719, 0.6528, 0.7590, 1.0]].concat();
-        let found = corrected(&p).iter().filter(|p| **p < 0.05).count();
+        let found = q_values(&p).iter().filter(|p| **p < 0.05).count();
         assert_eq!(found, 4);
+        // R: p.adjust(c(0.01, 0.02, 0.03, 0.04, 0.05), "BH"), and unordered values with ties.
+        let q = q_values(&[0.01, 0.02, 0.03, 0.04, 0.05]);
+        assert!(q.iter().all(|q| (q - 0.05).abs() < 1e-15), "{q:?}");
+        let q = q_values(&[0.9, 0.001, 0.04, 0.001]);
+        for (q, expected) in q.iter().zip([0.9, 0.002, 0.16 / 3.0, 0.002]) {
+            assert!((q - expected).abs() < 1e-15, "{q} {expected}");
+        }
+        assert!(q_values(&[]).is_empty());
     }
 
     #[test]

@@ -10,7 +10,7 @@ use stretch_gap::{GapError, SampleFit, SampleValue, Simulator, fit_samples};
 use crate::{error::ProblemError, examine::Examined, problem::Problem};
 use groups::Group;
 
-pub use heterogeneity::{Apart, Heterogeneity};
+pub use heterogeneity::{Apart, Heterogeneity, q_values};
 
 /// Fit to one run, or to all runs together.
 #[derive(Debug, Clone, Serialize)]

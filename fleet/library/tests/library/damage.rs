@@ -27,10 +27,10 @@ fn merged(states: &[Option<Vec<u8>>]) -> Answer {
 #[test]
 fn a_state_of_another_version_is_refused_by_name() {
     let mut newer = state();
-    assert_eq!(newer[..5], *b"STRF\x01");
-    newer[4] = 2;
+    assert_eq!(newer[..5], *b"STRF\x02");
+    newer[4] = 3;
     let told = merged(&[Some(state()), Some(newer)]).refused.unwrap();
-    assert!(told.contains("it has version 2, but this release reads version 1"), "{told}");
+    assert!(told.contains("it has version 3, but this release reads version 2"), "{told}");
 }
 
 #[test]
@@ -99,7 +99,7 @@ proptest! {
 
     #[test]
     fn any_bytes_never_panic(bytes in proptest::collection::vec(any::<u8>(), 0..300), magic in any::<bool>()) {
-        let mut state = if magic { b"STRF\x01\x02\x01\x03".to_vec() } else { Vec::new() };
+        let mut state = if magic { b"STRF\x02\x01\x01\x03".to_vec() } else { Vec::new() };
         state.extend(bytes);
         let found = merged(&[Some(state)]);
         prop_assert!(found.refused.is_some());

@@ -73,11 +73,6 @@ fn one_bad_sensor_of_many_is_a_row() {
 fn queries_that_mean_nothing_are_refused_by_name() {
     let session = session(&gauge(300, 1), 1);
     let cases = [
-        ("select polyij_fit(1, 9, rate, bridge_v, contraction) from trials", "0 to 5"),
-        (
-            "select polyij_fit(sensor, 3, rate, bridge_v, contraction) from trials",
-            "is written in the query",
-        ),
         (
             "select poly13_fit(rate, bridge_v, contraction) over (order by bridge_v rows between 3 preceding and \
              current row) from trials",

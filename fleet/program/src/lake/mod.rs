@@ -27,7 +27,6 @@ use datafusion::{
     parquet::arrow::arrow_reader::ArrowReaderMetadata,
 };
 use rayon::{iter::Either, prelude::*};
-use serde::Serialize;
 
 pub(crate) use about::{About, Footer, digest, digest_of_file};
 pub(crate) use place::{COLUMNS, Place, check_name, register, register_folder};
@@ -214,7 +213,7 @@ fn common(about: &About, files: &[LakeFile]) -> (SchemaRef, Vec<String>) {
 }
 
 /// A file that was refused.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub(crate) struct Refused {
     /// The file.
     pub file: String,

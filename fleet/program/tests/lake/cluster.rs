@@ -64,7 +64,7 @@ fn ready_commands_answer_the_same_on_a_cluster() {
     let folder = tempfile::tempdir().unwrap();
     let [lake, here, there] = ["lake", "here", "there"].map(|name| folder.path().join(name));
     said("make --lake {} --sensors 5 --days 62 --rows 200 --drifting 0.5 --drift 0.05", &[&lake]);
-    let drift = "drift --lake {} --from 2026-01 --to 2026-02 --json";
+    let drift = "drift --lake {} --from 2026-01 --to 2026-02";
     said("calibrate --lake {} --out {}", &[&lake, &here]);
     let moved = said(drift, &[&lake]);
     std::fs::remove_dir_all(lake.join("states")).unwrap();

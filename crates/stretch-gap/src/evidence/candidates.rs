@@ -193,7 +193,7 @@ pub(crate) fn posterior(
 ) -> Result<(Posterior, Vec<Held>), GapError> {
     let (mut kept, mut by_effects) = (Vec::new(), BTreeMap::new());
     for (hypothesis, (candidate, blocks)) in hypotheses.into_iter().zip(candidates) {
-        let left = evidence.fitted_gap(problem, &hypothesis).max(candidate.gap_after);
+        let left = evidence.gap_of(problem, &hypothesis.misfits).max(candidate.gap_after);
         let closed = 1.0 - left / evidence.gap.retuned;
         if hypothesis.effects.is_empty() || closed >= LEAST_CLOSED {
             by_effects.insert(hypothesis.effects.clone(), (candidate, blocks));

@@ -233,11 +233,6 @@ impl Evidence {
         })
     }
 
-    /// Returns the gap that a hypothesis leaves on fitted and held-out trials, summed over stages.
-    pub(crate) fn fitted_gap(&self, problem: &PreparedProblem<'_>, hypothesis: &Hypothesis) -> f64 {
-        fitted(problem, &hypothesis.misfits, &self.levels)
-    }
-
     /// Returns the gap that these misfits make on fitted and held-out trials, summed over stages.
     pub(crate) fn gap_of(&self, problem: &PreparedProblem<'_>, misfits: &[Misfit]) -> f64 {
         fitted(problem, misfits, &self.levels)

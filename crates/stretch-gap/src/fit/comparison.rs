@@ -17,7 +17,7 @@ use crate::{
     },
     numerics::linear::dot,
     problem::{
-        error::GapError,
+        error::{GapError, if_possible},
         runs::Runs,
         sample_roles::{Role, SampleRoles},
         simulator::{Model, Run, Simulator},
@@ -121,7 +121,7 @@ impl<'a> Comparison<'a> {
     }
 
     /// Returns measured minus simulated output, in multiples of the noise.
-    fn apart(&self, stage: usize, mut values: Vec<f64>) -> Vec<f64> {
+    pub(crate) fn apart(&self, stage: usize, mut values: Vec<f64>) -> Vec<f64> {
         let measured = self.simulator().measured(stage);
         for ((x, m), sd) in values.iter_mut().zip(measured).zip(&self.metrics[stage].noise.sd) {
             *x = (m - *x) / sd;
@@ -154,11 +154,7 @@ impl<'a> Comparison<'a> {
         let one = |_| {
             // Take all residuals of a model from the iterator, even if one of them failed.
             let own: Vec<Result<Vec<f64>, GapError>> = there.by_ref().take(stages.len()).collect();
-            match own.into_iter().collect::<Result<Vec<_>, _>>() {
-                Ok(own) => Ok(Some(own)),
-                Err(error) if error.ends_all() => Err(error),
-                Err(_) => Ok(None),
-            }
+            if_possible(own.into_iter().collect())
         };
         models.iter().map(one).collect()
     }
@@ -321,18 +317,18 @@ impl<'a> Comparison<'a> {
         let there = self.residuals_of(&wanted, Some(near));
         let columns = places.par_iter().zip(there).map(|(&(c, s), there)| {
             let ((coordinate, _), (step, _)) = (&coordinates[c], &moved[c]);
-            let (step, there) = match there {
-                // A step to this side cannot be simulated: step to the other side.
-                Err(error) if !error.ends_all() => {
+            let (step, there) = match if_possible(there)? {
+                Some(there) => (*step, there),
+                None => {
+                    // A step to this side cannot be simulated: step to the other side.
                     let mut other = model.clone();
                     coordinate.write(&mut other, coordinate.read(model) - step);
                     let mut back = self.residuals_of(&[(stages[s], &other)], Some(near));
-                    match back.remove(0) {
-                        Err(error) if !error.ends_all() => return Ok((c, s, None)),
-                        back => (-step, back?),
+                    match if_possible(back.remove(0))? {
+                        Some(back) => (-step, back),
+                        None => return Ok((c, s, None)),
                     }
                 }
-                there => (*step, there?),
             };
             let here = &residuals[s].values;
             let values = here.iter().zip(there).map(|(a, b)| (a - b) / step).collect();

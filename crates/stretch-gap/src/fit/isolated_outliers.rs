@@ -19,6 +19,8 @@
 
 use std::{collections::BTreeSet, ops::Range};
 
+use crate::problem::noise::median;
+
 /// Smallest deviation of an isolated sample, in standard deviations. Less than one in 10^9 samples
 /// of normal noise exceeds it.
 const ALONE: f64 = 8.0;
@@ -91,9 +93,7 @@ fn is_run(r: &[f64], moves: &[f64], steps: &[f64], span: Range<usize>) -> bool {
 /// Estimates the standard deviation of the noise from the steps near the step with the index `at`.
 fn deviation(steps: &[f64], at: usize) -> f64 {
     let near = &steps[at.saturating_sub(NEAR)..(at + NEAR + 2).min(steps.len())];
-    let mut sizes: Vec<f64> = near.iter().map(|d| d.abs()).collect();
-    let middle = sizes.len() / 2;
-    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1 / MEDIAN_STEP
+    median(near.iter().map(|d| d.abs()).collect()).unwrap_or(0.0) / MEDIAN_STEP
 }
 
 #[cfg(test)]

@@ -40,7 +40,10 @@ use crate::{
         score::Misfit,
     },
     numerics::linear::{Cholesky, boxed},
-    problem::{error::GapError, simulator::Model},
+    problem::{
+        error::{GapError, if_possible},
+        simulator::Model,
+    },
 };
 
 /// Result of a fit of some stages with some effects.
@@ -99,6 +102,8 @@ pub(crate) const HELD: Effort =
 
 /// Added to every diagonal element of N, because a coordinate without influence has no curvature.
 const RIDGE: f64 = 1e-12;
+/// Largest number of successive fits, each with new sensitivities.
+const DESCENTS: usize = 4;
 /// Number of dampings that are tried in one iteration.
 const TRIES: usize = 5;
 /// An iteration has gained nothing if the cost falls by less than the first number, in nats, plus
@@ -152,18 +157,37 @@ impl Comparison<'_> {
         Ok(descent.finish())
     }
 
-    /// The same as [`Comparison::fit`], after the simulator has been linearised around the starting
-    /// model.
-    pub(crate) fn fit_linearised(
+    /// Repeats fits, each from the end of the previous one, while the cost falls by at least
+    /// `least`, in nats. Before each fit, the simulator is linearised around the starting model. If
+    /// a repetition fails, the result before it is returned.
+    pub(crate) fn descend(
         &self,
         stages: &[usize],
         start: Model,
         effort: Effort,
+        least: f64,
     ) -> Result<Fitted, GapError> {
-        for &stage in stages {
-            self.runs.linearise(stage, &start, self.roles.fit_trials)?;
+        let fit = |start: Model| {
+            for &stage in stages {
+                self.runs.linearise(stage, &start, self.roles.fit_trials)?;
+            }
+            self.fit(stages, start, &[], effort)
+        };
+        let mut best = fit(start)?;
+        for _ in 1..DESCENTS {
+            if self.runs.is_spent() {
+                break;
+            }
+            let Some(next) = if_possible(fit(best.model.clone()))? else { break };
+            let fall = best.cost - next.cost;
+            if fall > 0.0 {
+                best = next;
+            }
+            if fall < least {
+                break;
+            }
         }
-        self.fit(stages, start, &[], effort)
+        Ok(best)
     }
 }
 
@@ -199,16 +223,7 @@ fn cost(
 pub(crate) fn possible<T: Send>(
     fits: impl ParallelIterator<Item = Result<T, GapError>>,
 ) -> Result<Vec<T>, GapError> {
-    let all: Vec<Result<T, GapError>> = fits.collect();
-    let mut out = Vec::with_capacity(all.len());
-    for fit in all {
-        match fit {
-            Ok(fit) => out.push(fit),
-            Err(error) if error.ends_all() => return Err(error),
-            Err(_) => {}
-        }
-    }
-    Ok(out)
+    fits.filter_map(|fit| if_possible(fit).transpose()).collect()
 }
 
 /// State of a running fit.
@@ -377,17 +392,13 @@ impl<'a, 'b> Descent<'a, 'b> {
             for (((c, _), x), s) in self.coordinates.iter().zip(&x).zip(&step) {
                 c.write(&mut next, x + s);
             }
-            match self.residuals_of(&next) {
-                Err(error) if error.ends_all() => return Err(error),
-                // These values cannot be simulated: try a shorter step.
-                Err(_) => {}
-                Ok(there) => {
-                    let cost = self.cost_of(&next, &there);
-                    if cost < self.cost {
-                        (self.model, self.residuals, self.cost) = (next, there, cost);
-                        self.lambda = (0.2 * self.lambda).max(1e-7);
-                        return Ok(true);
-                    }
+            // If these values cannot be simulated, try a shorter step.
+            if let Some(there) = if_possible(self.residuals_of(&next))? {
+                let cost = self.cost_of(&next, &there);
+                if cost < self.cost {
+                    (self.model, self.residuals, self.cost) = (next, there, cost);
+                    self.lambda = (0.2 * self.lambda).max(1e-7);
+                    return Ok(true);
                 }
             }
             self.lambda = (8.0 * self.lambda).max(1e-4);

@@ -185,18 +185,8 @@ impl<'a> PreparedProblem<'a> {
     where
         'a: 'b,
     {
-        PreparedProblem {
-            compare: self.compare.beside(simulator, self.compare.metrics.clone()),
-            shipped: self.shipped.clone(),
-            nominal: self.nominal.clone(),
-            information: self.information.clone(),
-            sensitivities: self.sensitivities.clone(),
-            memory: self.memory.clone(),
-            observations: self.observations.clone(),
-            transmitted: self.transmitted.clone(),
-            starts: self.starts,
-            is_held: self.is_held,
-        }
+        let compare = self.compare.beside(simulator, self.compare.metrics.clone());
+        PreparedProblem { compare, ..self.clone() }
     }
 
     pub(crate) fn simulator(&self) -> &'a dyn Simulator {

@@ -36,8 +36,6 @@ use crate::{
     },
 };
 
-/// Largest number of descents, each with new sensitivities.
-const ROUNDS: usize = 4;
 /// Fall of the cost, nats, below which a further descent is not worth its runs.
 const LEAST_FALL: f64 = 0.03;
 /// Number of standard deviations on either side of the mean within which 95 % of a Gaussian lie.
@@ -129,7 +127,11 @@ pub fn fit_samples(
     };
     let times_noise = |residuals: &[Vec<f64>]| mean_square(&residuals.concat()).sqrt();
     let times_noise_of_start = times_noise(&residuals(start)?);
-    let best = descended(&compare, &stages, start)?;
+    let best = compare.descend(&stages, start.clone(), FINE_OF_FORM, LEAST_FALL)?;
+    if compare.runs.is_spent() {
+        let what = "the budget of model runs is spent".into();
+        return Err(GapError::TooLittle { what, hint: "allow more runs".into() });
+    }
     let left = residuals(&best.model)?;
     let more = left.iter().map(|r| mean_square(r) * correlation_time(r));
     let values = values(simulator, &best, start, more.fold(1.0, f64::max));
@@ -139,30 +141,6 @@ pub fn fit_samples(
         times_noise_of_start,
         values,
     })
-}
-
-/// Repeats descents while the cost falls, each from the end of the previous one.
-fn descended(
-    compare: &Comparison<'_>,
-    stages: &[usize],
-    start: &Model,
-) -> Result<Fitted, GapError> {
-    let mut best = compare.fit_linearised(stages, start.clone(), FINE_OF_FORM)?;
-    for _ in 1..ROUNDS {
-        let next = compare.fit_linearised(stages, best.model.clone(), FINE_OF_FORM)?;
-        let fall = best.cost - next.cost;
-        best = next;
-        if fall < LEAST_FALL {
-            break;
-        }
-    }
-    match compare.runs.is_spent() {
-        false => Ok(best),
-        true => Err(GapError::TooLittle {
-            what: "the budget of model runs is spent".into(),
-            hint: "allow more runs".into(),
-        }),
-    }
 }
 
 /// Returns the values of a fit. Its information is divided by `inflation`.

@@ -30,7 +30,12 @@ use crate::{
         score::{LEARNT, Misfit, gap},
     },
     numerics::random::RandomGenerator,
-    problem::{error::GapError, linked_stages::groups, sample_roles::Role, simulator::Model},
+    problem::{
+        error::{GapError, if_possible},
+        linked_stages::groups,
+        sample_roles::Role,
+        simulator::Model,
+    },
 };
 
 /// Number of points whose cost is computed.
@@ -41,8 +46,6 @@ const SPREAD: f64 = 2.0;
 const DESCENTS: usize = 3;
 /// The cost at a point is near that of the re-tuning if it is at most this multiple of it.
 const NEAR: f64 = 2.0;
-/// Largest number of successive descents, each with new sensitivities.
-const ROUNDS: usize = 4;
 /// Growing parts of the trials, to which the descents are limited one after the other.
 const PARTS: [f64; 4] = [0.1, 0.2, 0.4, 0.7];
 /// Share of the re-tuning's gap that a descent over a part may leave there.
@@ -260,28 +263,12 @@ impl StartSearch<'_, '_> {
     fn descended(
         &self,
         compare: &Comparison<'_>,
-        mut model: Model,
+        model: Model,
     ) -> Result<Option<Fitted>, GapError> {
-        let mut best: Option<Fitted> = None;
-        for _ in 0..ROUNDS {
-            if compare.runs.is_spent() {
-                break;
-            }
-            let fitted = match compare.fit_linearised(self.group, model, FINE) {
-                Ok(fitted) => fitted,
-                Err(error) if error.ends_all() => return Err(error),
-                Err(_) => break,
-            };
-            model = fitted.model.clone();
-            let gained = best.as_ref().map_or(f64::INFINITY, |b| b.cost - fitted.cost);
-            if gained > 0.0 {
-                best = Some(fitted);
-            }
-            if gained < LEARNT {
-                break;
-            }
+        match compare.runs.is_spent() {
+            true => Ok(None),
+            false => if_possible(compare.descend(self.group, model, FINE, LEARNT)),
         }
-        Ok(best)
     }
 
     /// Descends over growing parts of the trials: at the beginning of a trial, the phases of

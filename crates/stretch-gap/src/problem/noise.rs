@@ -360,7 +360,7 @@ fn bends(stretch: &[f64]) -> Vec<f64> {
 }
 
 /// Returns the median, the larger of two middle values; `None` if there are no values.
-fn median(mut values: Vec<f64>) -> Option<f64> {
+pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
     let middle = values.len() / 2;
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }

@@ -16,7 +16,7 @@
 
 use std::ops::Range;
 
-use crate::problem::noise::{Noise, take_waves_out};
+use crate::problem::noise::{Noise, median, take_waves_out};
 
 /// Share at the beginning of a rest during which the output may still settle.
 const SETTLES: f64 = 1.0 / 3.0;
@@ -57,9 +57,7 @@ impl Noise {
         let rests = trials.iter().flat_map(|trial| rests(inputs, trial.clone()));
         let parts: Vec<&[f64]> = rests.flat_map(|rest| output[rest].chunks_exact(PART)).collect();
         let powers: Vec<f64> = parts.iter().map(|part| power(part, dt_s)).collect();
-        let mut sorted = powers.clone();
-        sorted.sort_by(f64::total_cmp);
-        let most = MOVES * sorted.get(sorted.len() / 2)?;
+        let most = MOVES * median(powers.clone())?;
         let kept: Vec<f64> = powers.into_iter().filter(|p| *p <= most).collect();
         let mean = kept.iter().sum::<f64>() / kept.len() as f64;
         let seconds = (kept.len() * PART) as f64 * dt_s;

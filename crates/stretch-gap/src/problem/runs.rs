@@ -85,10 +85,7 @@ impl<'a> Runs<'a> {
     where
         'a: 'b,
     {
-        let (count, was_cut) = (Arc::clone(&self.count), Arc::clone(&self.was_cut));
-        let (lost, most) = (Arc::clone(&self.lost), Arc::clone(&self.most));
-        let Self { stop, step, may_use_reserve, .. } = *self;
-        Runs { simulator, stop, count, was_cut, lost, most, step, may_use_reserve }
+        Runs { simulator, ..self.clone() }
     }
 
     /// Returns runs whose integration steps are `step` times as long.

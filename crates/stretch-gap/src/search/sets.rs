@@ -177,7 +177,7 @@ impl<'a> Sets<'a> {
 
     /// Returns `base` with the effects `effects`, and with the component in `stages` replaced by
     /// the fit.
-    fn join(
+    pub(crate) fn join(
         &self,
         base: &Hypothesis,
         effects: Vec<usize>,
@@ -381,26 +381,22 @@ impl<'a> Sets<'a> {
         ground: &Ground,
         screened: &[&Screened],
     ) -> Result<BTreeMap<usize, Extended>, GapError> {
-        let before = |s: &Screened| self.before.get(&key(&base.effects, Some(s.effect)));
-        let again: Vec<(usize, &Model)> =
-            screened.iter().filter_map(|s| Some((s.effect, before(s)?))).collect();
-        let again_of: Vec<usize> = again.iter().map(|(effect, _)| *effect).collect();
-        let again = possible(self.affordable(again).map(|(effect, model)| {
-            Ok((effect, self.extend(base, ground, effect, (model.clone(), GLANCE))?))
-        }))?;
+        let known = |s: &Screened| self.before.get(&key(&base.effects, Some(s.effect)));
+        let again = screened.iter().filter_map(|s| Some((s.effect, known(s)?.clone(), GLANCE)));
         let fresh: Vec<&Screened> =
-            screened.iter().filter(|s| before(s).is_none()).copied().collect();
+            screened.iter().filter(|s| known(s).is_none()).copied().collect();
         let starts = self.starts(base, &fresh)?;
         let (several, one): (Vec<_>, Vec<_>) = starts.into_iter().partition(|s| s.1.len() > 1);
         let best = self.glanced(base, ground, several)?;
+        let best = best.into_iter().map(|(effect, fitted)| (effect, fitted.model));
         let begun = one.into_iter().filter_map(|(e, starts)| Some((e, starts.into_iter().next()?)));
-        let begun: Vec<(usize, Model)> =
-            begun.chain(best.into_iter().map(|(effect, fitted)| (effect, fitted.model))).collect();
-        let asked: Vec<usize> = begun.iter().map(|(effect, _)| *effect).chain(again_of).collect();
-        let fits = self.affordable(begun).map(|(effect, model)| {
-            Ok((effect, self.extend(base, ground, effect, (model, COARSE))?))
+        let begun = begun.chain(best).map(|(effect, model)| (effect, model, COARSE));
+        let all: Vec<(usize, Model, Effort)> = again.chain(begun).collect();
+        let asked: Vec<usize> = all.iter().map(|one| one.0).collect();
+        let fits = self.affordable(all).map(|(effect, model, effort)| {
+            Ok((effect, self.extend(base, ground, effect, (model, effort))?))
         });
-        let fitted: BTreeMap<usize, Extended> = possible(fits)?.into_iter().chain(again).collect();
+        let fitted: BTreeMap<usize, Extended> = possible(fits)?.into_iter().collect();
         self.take_out(&asked, |effect| fitted.contains_key(&effect));
         Ok(fitted)
     }

@@ -6,11 +6,16 @@
 //! k^2)). The motion is at rest if its rate is below four of these standard deviations, or below 2
 //! % of the fastest rate.
 
+use std::ops::Range;
+
 use stretch_filter::log::second_differences;
 
 use stretch_data::ends;
 
-use crate::problem::{record_facts::Motion, sample_roles::SampleRoles, simulator::Simulator};
+use crate::problem::{
+    noise::median, record_facts::Motion, sample_roles::SampleRoles, simulator::Simulator,
+    spec::TrialSpec,
+};
 
 /// Samples on each side over which a rate is fitted.
 const REACH: usize = 10;
@@ -39,23 +44,20 @@ pub(super) struct Course {
     still: f64,
     /// Distance travelled since the session began.
     travel: Vec<f64>,
-    /// First sample of every trial, and the end of the last.
-    starts: Vec<usize>,
+    /// Range of the samples of every trial.
+    trials: Vec<Range<usize>>,
 }
 
 impl Course {
     pub(super) fn of(simulator: &dyn Simulator, roles: &SampleRoles) -> Self {
         let Motion { values, .. } = simulator.motion();
         let dt_s = simulator.dt_s();
-        let mut starts = vec![0];
-        for trial in simulator.trials() {
-            starts.push(starts[starts.len() - 1] + trial.samples);
-        }
+        let trials = TrialSpec::ranges(simulator.trials());
         let samples = roles.samples(simulator.trials().len()).min(values.len());
         let mut level = vec![0.0; samples];
         let mut rate = vec![0.0; samples];
-        for trial in starts.windows(2) {
-            let (from, to) = (trial[0], trial[1].min(samples));
+        for trial in &trials {
+            let (from, to) = (trial.start, trial.end.min(samples));
             for i in from..to {
                 let (a, b) = (i.saturating_sub(REACH).max(from), (i + REACH + 1).min(to));
                 (level[i], rate[i]) = line(&values[a..b], i - a, dt_s);
@@ -71,7 +73,7 @@ impl Course {
         let (mut sum, mut last, mut next) = (0.0, level.first().copied().unwrap_or(0.0), 0);
         for (i, (&x, r)) in level.iter().zip(&rate).enumerate() {
             // Motion between trials counts as well.
-            if starts[next] == i {
+            if trials.get(next).is_some_and(|trial| trial.start == i) {
                 sum += f64::abs(x - last);
                 next += 1;
             }
@@ -79,7 +81,7 @@ impl Course {
             travel.push(sum);
             last = x;
         }
-        Self { level, rate, still, travel, starts }
+        Self { level, rate, still, travel, trials }
     }
 
     fn len(&self) -> usize {
@@ -98,17 +100,16 @@ impl Course {
     /// Returns the samples at which the motion reverses.
     fn reversals(&self, dt_s: f64) -> Vec<usize> {
         let mut found = Vec::new();
-        for trial in self.starts.windows(2) {
+        for trial in &self.trials {
             let mut last: Option<(i8, usize)> = None;
-            for i in trial[0]..trial[1].min(self.len()) {
+            for i in trial.start..trial.end.min(self.len()) {
                 let sense = self.sense(i);
                 if sense == 0 {
                     continue;
                 }
-                if let Some((before, at)) = last.filter(|l| l.0 != sense) {
+                if let Some((_, at)) = last.filter(|l| l.0 != sense) {
                     let dwell_s = (i - at) as f64 * dt_s;
                     found.push(if dwell_s < SHORT_DWELL_S { (i + at) / 2 } else { i });
-                    let _ = before;
                 }
                 last = Some((sense, i));
             }
@@ -153,10 +154,10 @@ impl Axis {
             .collect();
         let around = (TURN_S / simulator.dt_s()).round() as usize;
         let reversals = course.reversals(simulator.dt_s());
-        for trial in course.starts.windows(2) {
-            let end = trial[1].min(of.len());
-            for &at in reversals.iter().filter(|at| (trial[0]..end).contains(*at)) {
-                of[at.saturating_sub(around).max(trial[0])..(at + around + 1).min(end)].fill(3);
+        for trial in &course.trials {
+            let end = trial.end.min(of.len());
+            for &at in reversals.iter().filter(|at| (trial.start..end).contains(*at)) {
+                of[at.saturating_sub(around).max(trial.start)..(at + around + 1).min(end)].fill(3);
             }
         }
         Self { by: "regime", labels: labels.into(), of }
@@ -193,8 +194,8 @@ impl Axis {
         let dt_s = simulator.dt_s();
         let mut time = Vec::with_capacity(course.len());
         let mut session = Vec::with_capacity(course.len());
-        for (spec, trial) in simulator.trials().iter().zip(course.starts.windows(2)) {
-            for i in 0..trial[1].min(course.len()).saturating_sub(trial[0]) {
+        for (spec, trial) in simulator.trials().iter().zip(&course.trials) {
+            for i in 0..trial.end.min(course.len()).saturating_sub(trial.start) {
                 time.push(i as f64 * dt_s);
                 session.push(spec.start_s + i as f64 * dt_s);
             }
@@ -275,9 +276,8 @@ fn line(samples: &[f64], at: usize, dt_s: f64) -> (f64, f64) {
 
 /// Estimates the noise of a recording from the median of its second differences.
 fn noise(values: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = second_differences(values).map(f64::abs).collect();
-    sizes.sort_by(f64::total_cmp);
-    sizes.get(sizes.len() / 2).map_or(0.0, |m| m / 0.6745 / 6f64.sqrt())
+    let middle = median(second_differences(values).map(f64::abs).collect());
+    middle.map_or(0.0, |m| m / 0.6745 / 6f64.sqrt())
 }
 
 #[cfg(test)]
@@ -327,7 +327,8 @@ mod tests {
                 way
             })
             .collect();
-        Course { starts: vec![0, rate.len()], level, rate, still: 0.1, travel }
+        let trials = std::iter::once(0..rate.len()).collect();
+        Course { trials, level, rate, still: 0.1, travel }
     }
 
     #[test]
@@ -355,7 +356,7 @@ mod tests {
     #[test]
     fn trials_turn_by_themselves() {
         let mut two = course([vec![1.0; 100], vec![-1.0; 100]].concat());
-        two.starts = vec![0, 100, 200];
+        two.trials = vec![0..100, 100..200];
         // One trial rises, the next falls: there is no turn between them.
         assert!(two.reversals(0.01).is_empty());
     }

@@ -20,6 +20,7 @@ use stretch_data::Trial;
 
 use crate::{
     evidence::gathered::Evidence,
+    fit::coordinate::coordinates,
     numerics::linear::{boxed, dot},
     problem::{
         error::GapError,
@@ -34,8 +35,6 @@ const ENOUGH: f64 = 3.0;
 /// Describes the next experiment if there is none.
 const HOPELESS: &str =
     "The rivals are so alike that none of the candidate experiments is likely to distinguish them.";
-/// Share of an effect parameter's range over which a sensitivity is computed.
-const SMALL: f64 = 0.02;
 
 /// A candidate experiment: a description, and the trial that performs it.
 #[derive(Debug, Clone, PartialEq)]
@@ -209,8 +208,8 @@ fn rivals<'a>(
 struct Tangent {
     values: Vec<f64>,
     slopes: Vec<Vec<f64>>,
-    /// How far each parameter may move down and up: a nominal parameter in tolerances, an effect's
-    /// parameter as a share of its range.
+    /// How far each parameter may move down and up, on the scale of its
+    /// [coordinate](crate::fit::coordinate).
     bounds: Vec<[f64; 2]>,
     channels: usize,
 }
@@ -223,41 +222,17 @@ impl Tangent {
             Ok((channels.into_iter().flatten().collect(), count))
         };
         let (values, channels) = run(model)?;
-        let mut slopes = Vec::new();
-        let mut bounds = Vec::new();
-        let mut slope = |moved: &Model, step: f64| -> Result<(), GapError> {
-            let (there, _) = run(moved)?;
-            slopes.push(there.iter().zip(&values).map(|(a, b)| (a - b) / step).collect());
-            Ok(())
-        };
-        for (i, p) in
-            simulator.description().parameters.iter().enumerate().filter(|(_, p)| p.sd > 0.0)
-        {
-            let at = (model.parameters[i] - p.nominal) / p.sd;
-            let step = if at > 0.0 { -0.3 } else { 0.3 };
+        let (mut slopes, mut bounds) = (Vec::new(), Vec::new());
+        let stages: Vec<usize> = (0..simulator.description().stages.len()).collect();
+        for (coordinate, [low, high]) in coordinates(simulator, &stages, model) {
+            let x = coordinate.read(model);
+            let step = coordinate.probe(x);
+            let step = if x + step > high { -step } else { step };
             let mut moved = model.clone();
-            moved.parameters[i] += step * p.sd;
-            slope(&moved, step)?;
-            bounds.push([-3.0 - at, 3.0 - at]);
-        }
-        for (slot, (effect, effect_values)) in model.effects.iter().enumerate() {
-            let specs = &simulator.description().effects[*effect].parameters;
-            for (k, p) in specs.iter().enumerate().filter(|(_, p)| p.is_fitted()) {
-                let range = p.max - p.min;
-                let x = effect_values[k];
-                let step = if x > p.min + 0.5 * range { -SMALL } else { SMALL };
-                // If the range is searched on a logarithmic scale, the step is at most a tenth of
-                // the value.
-                let step = if p.is_log() && x > 0.0 {
-                    step.signum() * (0.1 * x / range).min(SMALL)
-                } else {
-                    step
-                };
-                let mut moved = model.clone();
-                moved.effects[slot].1[k] = x + step * range;
-                slope(&moved, step)?;
-                bounds.push([(p.min - x) / range, (p.max - x) / range]);
-            }
+            coordinate.write(&mut moved, x + step);
+            let (there, _) = run(&moved)?;
+            slopes.push(there.iter().zip(&values).map(|(a, b)| (a - b) / step).collect());
+            bounds.push([low - x, high - x]);
         }
         Ok(Self { values, slopes, bounds, channels })
     }

@@ -18,7 +18,7 @@ use crate::{
         term_sum::weigh_term_sum,
     },
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    missing::{Proposed, propose, propose_for},
+    missing::{Proposed, propose},
     numerics::stopwatch::Stopwatch,
     options::{Options, threads},
     problem::{
@@ -414,20 +414,31 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Judged {
 }
 
 /// Searches for a sum of terms outside the catalogue: in addition to the named effects if the
-/// verdict is `partial`, in place of effects if it is `unknown`.
+/// verdict is `partial`, in place of effects if it is `unknown`. A sum of terms that does not reduce
+/// the gap on the test trials is dropped.
 fn propose_rest(
     task: Task<'_>,
     cause: Cause<'_>,
     gathered: &Gathered,
     verdict: VerdictKind,
 ) -> Result<Option<Proposed>, GapError> {
-    let with_names = verdict == VerdictKind::Partial;
-    if gathered.too_little.is_some() || (!with_names && verdict != VerdictKind::Unknown) {
+    let from = match verdict {
+        VerdictKind::Partial => &cause.found.best,
+        VerdictKind::Unknown => &cause.problem.nominal,
+        _ => return Ok(None),
+    };
+    if gathered.too_little.is_some() {
         return Ok(None);
     }
-    let known = (with_names, gathered.proposed.as_ref());
-    let found = propose_for(cause.problem, &cause.found.best, known, task.progress);
-    Ok(if_possible(found)?.flatten())
+    let known = gathered.proposed.clone().filter(|_| verdict == VerdictKind::Unknown);
+    let found = match known {
+        Some(known) => Some(known),
+        None => {
+            (task.progress)("searching for an equation outside the catalogue");
+            if_possible(propose(cause.problem, from))?.flatten().map(|proposal| proposal.told)
+        }
+    };
+    Ok(found.filter(|p| p.random || p.terms.is_empty() || p.closes_test > 0.0))
 }
 
 /// Assembles the diagnosis: verdict, numbers, notes and summary sentence.

@@ -90,89 +90,97 @@ fn rate(signal: usize, form: RateForm) -> Factor {
     Rate { signal, form }
 }
 
+/// Levels by which friction and commands are multiplied.
+fn levels(signal: usize) -> [Factor; 3] {
+    [power(signal, 1.0), power(signal, 2.0), Below { signal, at: 1.0, power: 1.0 }]
+}
+
+fn plays(signal: usize) -> [Factor; 5] {
+    WIDTHS.map(|width| Play { signal, width })
+}
+
 impl Shelf<'_> {
     fn direct(&mut self, factors: &[Factor]) {
         self.terms.push(Term::new(factors, Passage::Direct));
     }
 
-    fn lagged(&mut self, factors: &[Factor]) {
-        for tau_s in self.times_s.clone() {
-            self.terms.push(Term::new(factors, Passage::Lag { tau_s }));
+    /// Adds the product of `with` and each of the factors.
+    fn each(&mut self, with: &[Factor], factors: impl IntoIterator<Item = Factor>) {
+        factors.into_iter().for_each(|factor| self.direct(&[with, &[factor]].concat()));
+    }
+
+    /// Adds each of the factors, and each times x of the signal `s`.
+    fn also_times(&mut self, s: usize, factors: impl IntoIterator<Item = Factor>) {
+        for factor in factors {
+            self.direct(&[factor]);
+            self.direct(&[power(s, 1.0), factor]);
         }
+    }
+
+    fn lagged(&mut self, factors: &[Factor]) {
+        let lagged = |&tau_s: &f64| Term::new(factors, Passage::Lag { tau_s });
+        self.terms.extend(self.times_s.iter().map(lagged));
+    }
+
+    fn lags(&self, signal: usize) -> Vec<Factor> {
+        self.times_s.iter().map(|&tau_s| Lag { signal, tau_s }).collect()
+    }
+
+    fn lates(&self, signal: usize) -> [Factor; 4] {
+        DELAYS.map(|n| Late { signal, delay_s: n * self.inputs.grid.dt_s() })
+    }
+
+    fn fades(&self) -> Vec<Factor> {
+        self.times_s[2..].iter().map(|&tau_s| TimeFade { tau_s }).collect()
     }
 
     fn clocks(&mut self) {
         self.direct(&[]);
-        for p in [0.5, 1.0, 2.0] {
-            self.direct(&[Time { power: p }]);
-        }
-        for p in [0.5, 1.0] {
-            self.direct(&[Session { power: p }]);
-        }
-        for &tau_s in &self.times_s.clone()[2..] {
-            self.direct(&[TimeFade { tau_s }]);
-        }
+        self.each(&[], [0.5, 1.0, 2.0].map(|power| Time { power }));
+        self.each(&[], [0.5, 1.0].map(|power| Session { power }));
+        self.each(&[], self.fades());
     }
 
     fn curves(&mut self, s: usize) {
-        for p in [0.5, 1.0, 1.5, 2.0, 3.0, 4.0] {
-            self.direct(&[power(s, p)]);
-        }
+        let signal = s;
+        self.each(&[], [0.5, 1.0, 1.5, 2.0, 3.0, 4.0].map(|p| power(s, p)));
         let at = self.inputs.signals[s].centre();
-        for p in [3, 4, 5] {
-            self.direct(&[Centred { signal: s, at, power: p }]);
-        }
+        self.each(&[], [3, 4, 5].map(|power| Centred { signal, at, power }));
         for share in QUANTILES {
             let at = self.inputs.quantile(s, share, self.roles);
-            for p in [1.0, 2.0] {
-                self.direct(&[Above { signal: s, at, power: p }]);
-                self.direct(&[Below { signal: s, at, power: p }]);
+            for power in [1.0, 2.0] {
+                self.each(&[], [Above { signal, at, power }, Below { signal, at, power }]);
             }
         }
         for width in WIDTHS {
-            self.direct(&[Low { signal: s, width }]);
-            self.direct(&[High { signal: s, width }]);
+            self.each(&[], [Low { signal, width }, High { signal, width }]);
         }
         for turns in TURNS {
-            self.direct(&[Sine { signal: s, turns }]);
-            self.direct(&[Cosine { signal: s, turns }]);
+            self.each(&[], [Sine { signal, turns }, Cosine { signal, turns }]);
         }
     }
 
     fn friction(&mut self, s: usize) {
         let forms = [Linear, Magnitude, Square, SignedSquare, SignedRoot, Sign, Striction, Rising];
-        let lower = Below { signal: s, at: 1.0, power: 1.0 };
-        for form in forms {
-            self.direct(&[rate(s, form)]);
-            for level in [power(s, 1.0), power(s, 2.0), lower] {
-                self.direct(&[level, rate(s, form)]);
-            }
-        }
-        self.direct(&[Bend { signal: s }]);
-        self.direct(&[power(s, 1.0), Bend { signal: s }]);
+        let rates = forms.map(|form| rate(s, form));
+        self.each(&[], rates);
+        levels(s).into_iter().for_each(|level| self.each(&[level], rates));
+        self.also_times(s, [Bend { signal: s }]);
     }
 
     fn memory(&mut self, s: usize) {
-        let x = power(s, 1.0);
-        let plays = WIDTHS.map(|width| Play { signal: s, width });
-        let turns = WIDTHS.map(|width| Turned { signal: s, width });
-        let lates = DELAYS.map(|n| Late { signal: s, delay_s: n * self.inputs.grid.dt_s() });
-        let lags: Vec<Factor> =
-            self.times_s.iter().map(|&tau_s| Lag { signal: s, tau_s }).collect();
-        let all = plays.into_iter().chain(turns).chain(lates).chain(lags);
-        for memory in all.chain([Peak { signal: s }]) {
-            self.direct(&[memory]);
-            self.direct(&[x, memory]);
-        }
-        for tau_s in self.times_s.clone() {
-            let lag = Lag { signal: s, tau_s };
+        self.also_times(s, plays(s));
+        self.also_times(s, WIDTHS.map(|width| Turned { signal: s, width }));
+        self.also_times(s, self.lates(s));
+        self.also_times(s, self.lags(s));
+        self.also_times(s, [Peak { signal: s }]);
+        for lag in self.lags(s) {
             self.direct(&[lag, lag]);
             for form in [Linear, Magnitude, Sign] {
                 self.direct(&[rate(s, form), lag]);
             }
         }
-        for width in WIDTHS {
-            let play = Play { signal: s, width };
+        for play in plays(s) {
             self.direct(&[rate(s, Magnitude), play]);
             self.direct(&[play, play]);
         }
@@ -185,28 +193,17 @@ impl Shelf<'_> {
         }
         self.lagged(&[power(s, 2.0)]);
         self.lagged(&[x, rate(s, Magnitude)]);
-        self.lagged(&[Above {
-            signal: s,
-            at: self.inputs.quantile(s, 0.5, self.roles),
-            power: 1.0,
-        }]);
-        for p in [0.5, 1.0] {
-            self.direct(&[Travel { signal: s, power: p }]);
-            self.direct(&[x, Travel { signal: s, power: p }]);
-            self.direct(&[x, Time { power: p }]);
-            self.direct(&[x, Session { power: p }]);
+        let at = self.inputs.quantile(s, 0.5, self.roles);
+        self.lagged(&[Above { signal: s, at, power: 1.0 }]);
+        for power in [0.5, 1.0] {
+            self.also_times(s, [Travel { signal: s, power }]);
+            self.each(&[x], [Time { power }, Session { power }]);
         }
-        for width in WEAR {
-            self.direct(&[TravelFade { signal: s, width }]);
-            self.direct(&[x, TravelFade { signal: s, width }]);
-        }
+        self.also_times(s, WEAR.map(|width| TravelFade { signal: s, width }));
         for form in [Linear, Sign] {
-            self.direct(&[rate(s, form), Time { power: 1.0 }]);
-            self.direct(&[rate(s, form), Session { power: 1.0 }]);
+            self.each(&[rate(s, form)], [Time { power: 1.0 }, Session { power: 1.0 }]);
         }
-        for &tau_s in &self.times_s.clone()[2..] {
-            self.direct(&[x, TimeFade { tau_s }]);
-        }
+        self.each(&[x], self.fades());
     }
 
     /// Adds x of the signal `s` times the terms of the signal `other`.
@@ -217,76 +214,54 @@ impl Shelf<'_> {
             self.direct(&[rate(s, Linear), rate(other, Linear)]);
         }
         self.direct(&[power(s, 2.0), power(other, 1.0)]);
-        for form in [Linear, Magnitude, Sign, SignedRoot, SignedSquare] {
-            self.direct(&[x, rate(other, form)]);
-        }
-        for &tau_s in &self.times_s.clone() {
-            self.direct(&[x, Lag { signal: other, tau_s }]);
-        }
-        for width in WIDTHS {
-            self.direct(&[x, Play { signal: other, width }]);
-        }
+        let forms = [Linear, Magnitude, Sign, SignedRoot, SignedSquare];
+        self.each(&[x], forms.map(|form| rate(other, form)));
+        self.each(&[x], self.lags(other));
+        self.each(&[x], plays(other));
         self.direct(&[x, Travel { signal: other, power: 1.0 }]);
     }
 
     fn command(&mut self, c: usize) {
         self.direct(&[power(c, 1.0)]);
         self.lagged(&[power(c, 1.0)]);
-        for n in DELAYS {
-            self.direct(&[Late { signal: c, delay_s: n * self.inputs.grid.dt_s() }]);
-        }
+        self.each(&[], self.lates(c));
     }
 
     fn commanded(&mut self, c: usize, s: usize) {
         let open = power(c, 1.0);
-        for level in [power(s, 1.0), power(s, 2.0), Below { signal: s, at: 1.0, power: 1.0 }] {
+        for level in levels(s) {
             self.direct(&[open, level]);
             self.lagged(&[open, level]);
         }
-        for form in [Linear, Sign] {
-            self.direct(&[open, rate(s, form)]);
-        }
+        self.each(&[open], [Linear, Sign].map(|form| rate(s, form)));
     }
 
     /// Adds terms that act on the rate of the output. The output is their integral, which leaks in
     /// proportion to the openings.
     fn rates(&mut self, states: &[usize], commands: &[usize]) {
-        let mut sources = vec![Vec::new(), vec![Session { power: 1.0 }], vec![Time { power: 1.0 }]];
+        let clocks = [Session { power: 1.0 }, Time { power: 1.0 }];
+        let mut sources = vec![Vec::new(), vec![clocks[0]], vec![clocks[1]]];
+        let open = |source: &[Factor]| {
+            commands.iter().map(|&c| [&[power(c, 1.0)][..], source].concat()).collect::<Vec<_>>()
+        };
         for &s in states {
-            let x = power(s, 1.0);
-            let lower = Below { signal: s, at: 1.0, power: 1.0 };
-            for level in [x, power(s, 2.0), power(s, 0.5), lower] {
-                sources.push(vec![level]);
-                sources.extend(commands.iter().map(|&c| vec![power(c, 1.0), level]));
+            let lags = self.lags(s);
+            let gated =
+                [power(s, 0.5)].into_iter().chain(levels(s)).chain([lags[1], lags[3], lags[5]]);
+            for factor in gated {
+                sources.push(vec![factor]);
+                sources.extend(open(&[factor]));
             }
-            for form in [Linear, Magnitude, Sign] {
-                sources.push(vec![rate(s, form)]);
-            }
-            for k in [1, 3, 5] {
-                let lag = Lag { signal: s, tau_s: self.times_s[k] };
-                sources.push(vec![lag]);
-                sources.extend(commands.iter().map(|&c| vec![power(c, 1.0), lag]));
-            }
-            for c in commands {
-                for clock in [Session { power: 1.0 }, Time { power: 1.0 }] {
-                    sources.push(vec![power(*c, 1.0), x, clock]);
-                }
-            }
+            sources.extend([Linear, Magnitude, Sign].map(|form| vec![rate(s, form)]));
+            clocks.iter().for_each(|clock| sources.extend(open(&[power(s, 1.0), *clock])));
         }
         for &c in commands {
-            sources.push(vec![power(c, 1.0)]);
-            sources.push(vec![power(c, 2.0)]);
-            for &tau_s in &self.times_s {
-                sources.push(vec![Lag { signal: c, tau_s }]);
-            }
-            for n in DELAYS {
-                sources.push(vec![Late { signal: c, delay_s: n * self.inputs.grid.dt_s() }]);
-            }
+            let own = [power(c, 1.0), power(c, 2.0)].into_iter().chain(self.lags(c));
+            sources.extend(own.chain(self.lates(c)).map(|factor| vec![factor]));
         }
         for tau_s in [0.1, 0.3, 1.0, 3.0] {
-            for source in &sources {
-                self.terms.push(Term::new(source, Passage::Leak { tau_s }));
-            }
+            let leaking = |source: &Vec<Factor>| Term::new(source, Passage::Leak { tau_s });
+            self.terms.extend(sources.iter().map(leaking));
         }
     }
 }

@@ -26,6 +26,6 @@ mod term_inputs;
 mod tests;
 
 pub use course::Course;
-pub(crate) use propose::{Proposal, propose, propose_for};
+pub(crate) use propose::{Proposal, propose};
 pub use proposed::{Proposed, ProposedTerm, SignalScale};
 pub use term::{Factor, Passage, RateForm, Term};

@@ -86,15 +86,7 @@ pub struct Proposed {
 
 /// Returns the signals of a recording to which terms refer.
 pub(crate) fn scales(inputs: &TermInputs) -> Vec<SignalScale> {
-    let one = |s: &super::term_inputs::Signal| SignalScale {
-        name: s.name.clone(),
-        unit: s.unit.clone(),
-        offset: s.offset,
-        scale: s.scale,
-        rate_per_s: s.rate,
-        is_command: s.is_command,
-    };
-    inputs.signals.iter().map(one).collect()
+    inputs.signals.iter().map(|signal| signal.spec.clone()).collect()
 }
 
 /// Returns the equation `channel += ...`, followed by the definitions of its symbols. `time_scales_s` are those of
@@ -157,67 +149,44 @@ pub(crate) fn words(term: &Term, signals: &[SignalScale]) -> String {
 }
 
 fn factor(factor: Factor, signals: &[SignalScale]) -> String {
-    let x = |s: usize| format!("x[{}]", signals[s].name);
-    let v = |s: usize| format!("v[{}]", signals[s].name);
+    let name = factor.signal().map_or("", |s| signals[s].name.as_str());
+    let (x, v) = (format!("x[{name}]"), format!("v[{name}]"));
     let raised = |what: String, p: f64| if p == 1.0 { what } else { format!("{what}^{p}") };
+    let short = |number: f64| in_digits(number, 3);
     match factor {
-        Factor::Power { signal, power } => raised(format!("max(0, {})", x(signal)), power),
-        Factor::Centred { signal, at, power } => {
-            raised(format!("({} - {})", x(signal), in_digits(at, 3)), f64::from(power))
+        Factor::Power { power, .. } => raised(format!("max(0, {x})"), power),
+        Factor::Centred { at, power, .. } => {
+            raised(format!("({x} - {})", short(at)), f64::from(power))
         }
-        Factor::Above { signal, at, power } => {
-            raised(format!("max(0, {} - {})", x(signal), in_digits(at, 3)), power)
-        }
-        Factor::Below { signal, at, power } => {
-            raised(format!("max(0, {} - {})", in_digits(at, 3), x(signal)), power)
-        }
-        Factor::Low { signal, width } => {
-            format!("exp(-max(0, {})/{})", x(signal), in_digits(width, 3))
-        }
-        Factor::High { signal, width } => {
-            format!("exp(-max(0, 1 - {})/{})", x(signal), in_digits(width, 3))
-        }
-        Factor::Sine { signal, turns } => {
-            format!("sin(2 pi {} {})", in_digits(turns, 3), x(signal))
-        }
-        Factor::Cosine { signal, turns } => {
-            format!("cos(2 pi {} {})", in_digits(turns, 3), x(signal))
-        }
-        Factor::Rate { signal, form } => match form {
-            RateForm::Linear => v(signal),
-            RateForm::Magnitude => format!("|{}|", v(signal)),
-            RateForm::Square => format!("{}^2", v(signal)),
-            RateForm::SignedSquare => format!("{0} |{0}|", v(signal)),
-            RateForm::SignedRoot => format!("sign({0}) sqrt|{0}|", v(signal)),
-            RateForm::Sign => format!("sign({})", v(signal)),
-            RateForm::Striction => format!("sign({0}) exp(-|{0}|/0.3)", v(signal)),
-            RateForm::Rising => format!("max(0, {})", v(signal)),
+        Factor::Above { at, power, .. } => raised(format!("max(0, {x} - {})", short(at)), power),
+        Factor::Below { at, power, .. } => raised(format!("max(0, {} - {x})", short(at)), power),
+        Factor::Low { width, .. } => format!("exp(-max(0, {x})/{})", short(width)),
+        Factor::High { width, .. } => format!("exp(-max(0, 1 - {x})/{})", short(width)),
+        Factor::Sine { turns, .. } => format!("sin(2 pi {} {x})", short(turns)),
+        Factor::Cosine { turns, .. } => format!("cos(2 pi {} {x})", short(turns)),
+        Factor::Rate { form, .. } => match form {
+            RateForm::Linear => v,
+            RateForm::Magnitude => format!("|{v}|"),
+            RateForm::Square => format!("{v}^2"),
+            RateForm::SignedSquare => format!("{v} |{v}|"),
+            RateForm::SignedRoot => format!("sign({v}) sqrt|{v}|"),
+            RateForm::Sign => format!("sign({v})"),
+            RateForm::Striction => format!("sign({v}) exp(-|{v}|/0.3)"),
+            RateForm::Rising => format!("max(0, {v})"),
         },
-        Factor::Bend { signal } => format!("step({})", v(signal)),
-        Factor::Play { signal, width } => {
-            format!("({0} - play({0}, {1}))", x(signal), in_digits(width, 3))
+        Factor::Bend { .. } => format!("step({v})"),
+        Factor::Play { width, .. } => format!("({x} - play({x}, {}))", short(width)),
+        Factor::Lag { tau_s, .. } => format!("({x} - lag({x}, {} s))", short(tau_s)),
+        Factor::Late { delay_s, .. } => format!("({x}(t - {} s) - {x})", short(delay_s)),
+        Factor::Peak { .. } => format!("(greatest {x} - {x})"),
+        Factor::Turned { width, .. } => {
+            let travelled = format!("travel since reversal of {x}/{}", short(width));
+            format!("sign({v}) (1 - exp(-{travelled}))")
         }
-        Factor::Lag { signal, tau_s } => {
-            format!("({0} - lag({0}, {1} s))", x(signal), in_digits(tau_s, 3))
-        }
-        Factor::Late { signal, delay_s } => {
-            format!("({0}(t - {1} s) - {0})", x(signal), in_digits(delay_s, 3))
-        }
-        Factor::Peak { signal } => format!("(greatest {0} - {0})", x(signal)),
-        Factor::Turned { signal, width } => {
-            format!(
-                "sign({}) (1 - exp(-travel since reversal of {}/{}))",
-                v(signal),
-                x(signal),
-                in_digits(width, 3)
-            )
-        }
-        Factor::Travel { signal, power } => raised(format!("travel({})", x(signal)), power),
-        Factor::TravelFade { signal, width } => {
-            format!("exp(-travel({})/{})", x(signal), in_digits(width, 3))
-        }
+        Factor::Travel { power, .. } => raised(format!("travel({x})"), power),
+        Factor::TravelFade { width, .. } => format!("exp(-travel({x})/{})", short(width)),
         Factor::Time { power } => raised("(time in trial/T_trial)".into(), power),
-        Factor::TimeFade { tau_s } => format!("exp(-time in trial/{} s)", in_digits(tau_s, 3)),
+        Factor::TimeFade { tau_s } => format!("exp(-time in trial/{} s)", short(tau_s)),
         Factor::Session { power } => raised("(session time/T_session)".into(), power),
     }
 }

@@ -13,7 +13,9 @@
 //! parameters x are those of the [coordinates](crate::fit::coordinate). b is the number of samples
 //! in a block. The ridge s_k is the coefficient at which term k alone is as large as the residual.
 
-use nalgebra::DMatrix;
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector};
 
 use crate::missing::{term::Term, term_inputs::TermInputs};
 use crate::{
@@ -40,20 +42,21 @@ pub(crate) struct Residue<'a> {
     pub(crate) stage: usize,
     pub(crate) model: Model,
     /// The residual over the trials that are fitted, in multiples of the noise.
-    pub(crate) residual: Column,
+    pub(crate) residual: Arc<Column>,
     pub(crate) inputs: TermInputs,
     /// Coordinates that are fitted together with the terms.
     coordinates: Vec<(Coordinate, [f64; 2])>,
     /// Sensitivities -dr/dx, one column for each coordinate.
-    columns: Vec<Column>,
+    columns: Vec<Arc<Column>>,
 }
 
-/// Inner products among the residual (first row and column), the sensitivities and the terms, over
-/// the fitted and over the held-out samples. A sum of terms is fitted from these products alone.
+/// The residual (first), the sensitivities and the terms, with their inner products over the fitted
+/// and over the held-out samples. A sum of terms is fitted from these products alone.
 #[derive(Clone)]
 pub(crate) struct Products {
-    pub(crate) fit: DMatrix<f64>,
-    pub(crate) held: DMatrix<f64>,
+    columns: Vec<Arc<Column>>,
+    fit: DMatrix<f64>,
+    held: DMatrix<f64>,
 }
 
 /// A sum of terms fitted together with the parameters.
@@ -76,26 +79,19 @@ impl<'a> Residue<'a> {
         let simulator = compare.simulator();
         let own = compare.runs.output(stage, model, simulator.trials().len())?;
         let inputs = TermInputs::of(simulator, &compare.roles, stage, own)?;
-        let residual = compare.residual(stage, model)?;
+        let residual = Arc::new(compare.residual(stage, model)?);
         let (mut kept, mut columns) = (Vec::new(), Vec::new());
         let places = coordinates(simulator, &[stage], model);
-        let at = (model, std::slice::from_ref(&residual));
+        let at = (model, std::slice::from_ref(&*residual));
         let all = compare.sensitivities(&[stage], &places, at, &model.parameters)?;
         for (place, found) in places.into_iter().zip(all) {
             if let Some(column) = found.into_iter().next().flatten() {
                 kept.push(place);
-                columns.push(column);
+                columns.push(Arc::new(column));
             }
         }
-        Ok(Self {
-            compare,
-            stage,
-            model: model.clone(),
-            residual,
-            inputs,
-            coordinates: kept,
-            columns,
-        })
+        let (model, coordinates) = (model.clone(), kept);
+        Ok(Self { compare, stage, model, residual, inputs, coordinates, columns })
     }
 
     /// Number of sensitivities.
@@ -108,7 +104,7 @@ impl<'a> Residue<'a> {
     }
 
     /// The columns of the sensitivities.
-    pub(crate) fn columns(&self) -> &[Column] {
+    pub(crate) fn columns(&self) -> &[Arc<Column>] {
         &self.columns
     }
 
@@ -128,41 +124,47 @@ impl<'a> Residue<'a> {
         acts.then(|| self.compare.metrics[self.stage].column(self.roles(), values))
     }
 
-    fn product(&self, roles: &SampleRoles, a: &Column, b: &Column, role: Role) -> f64 {
-        self.compare.metrics[self.stage].product(roles, a, b, role)
+    /// Returns the products of the residual of a model, the sensitivities and the columns of terms;
+    /// `roles` defines the held-out samples.
+    pub(crate) fn products(
+        &self,
+        roles: &SampleRoles,
+        residual: &Arc<Column>,
+        terms: &[Arc<Column>],
+    ) -> Products {
+        let (columns, fit, held) = Default::default();
+        let all = std::iter::once(residual).chain(&self.columns).chain(terms);
+        let empty = Products { columns, fit, held };
+        all.fold(empty, |products, new| self.with(roles, &products, new))
     }
 
-    /// Returns the products of the residual and the sensitivities; `roles` defines the held-out
-    /// samples.
-    pub(crate) fn products(&self, roles: &SampleRoles, residual: &Column) -> Products {
-        let mut products = Products { fit: DMatrix::zeros(0, 0), held: DMatrix::zeros(0, 0) };
-        let all: Vec<&Column> = std::iter::once(residual).chain(&self.columns).collect();
-        for n in 0..all.len() {
-            products = self.with(roles, &products, &all[..n], all[n]);
-        }
-        products
-    }
-
-    /// Appends the column `new` to the products; `before` lists the columns that `products` already
-    /// contains.
+    /// Appends a column to the products.
     pub(crate) fn with(
         &self,
         roles: &SampleRoles,
         products: &Products,
-        before: &[&Column],
-        new: &Column,
+        new: &Arc<Column>,
     ) -> Products {
+        let mut columns = products.columns.clone();
+        columns.push(Arc::clone(new));
         let grown = |old: &DMatrix<f64>, role| {
-            let n = before.len();
-            let mut all = old.clone().resize(n + 1, n + 1, 0.0);
-            for (i, column) in before.iter().copied().chain([new]).enumerate() {
-                let product = self.product(roles, column, new, role);
-                all[(i, n)] = product;
-                all[(n, i)] = product;
+            let n = columns.len();
+            let mut all = old.clone().resize(n, n, 0.0);
+            let metric = &self.compare.metrics[self.stage];
+            for (i, column) in columns.iter().enumerate() {
+                let product = metric.product(roles, column, new, role);
+                all[(i, n - 1)] = product;
+                all[(n - 1, i)] = product;
             }
             all
         };
-        Products { fit: grown(&products.fit, Role::Fit), held: grown(&products.held, Role::Held) }
+        let (fit, held) = (grown(&products.fit, Role::Fit), grown(&products.held, Role::Held));
+        Products { columns, fit, held }
+    }
+
+    /// Returns the columns of the terms.
+    pub(crate) fn terms<'p>(&self, products: &'p Products) -> &'p [Arc<Column>] {
+        &products.columns[1 + self.columns.len()..]
     }
 
     /// Returns the second derivative of J with respect to shifts and coefficients.
@@ -207,7 +209,7 @@ impl<'a> Residue<'a> {
             high[i] = if free { (bounds[1] - x).min(c.stride()).max(0.0) } else { 0.0 };
         }
         let values = boxed(&normal, &slope, &low, &high);
-        let x = nalgebra::DVector::from_column_slice(&values);
+        let x = DVector::from_column_slice(&values);
         let bend = (x.transpose() * &normal * &x)[(0, 0)];
         let fall: f64 = slope.iter().zip(&values).map(|(g, x)| g * x).sum();
         let cost = 0.5 * weight * products.fit[(0, 0)] + prior + fall + 0.5 * bend;
@@ -236,6 +238,6 @@ impl<'a> Residue<'a> {
 /// `values` is x.
 fn quadratic(products: &DMatrix<f64>, values: &[f64]) -> f64 {
     let signed: Vec<f64> = std::iter::once(1.0).chain(values.iter().map(|x| -x)).collect();
-    let x = nalgebra::DVector::from_column_slice(&signed);
+    let x = DVector::from_column_slice(&signed);
     (x.transpose() * products * &x)[(0, 0)]
 }

@@ -14,7 +14,7 @@
 //! leaves the smallest held-out residual is added if it closes a minimum share of the held-out gap
 //! (the sum of squares beyond that of the noise).
 
-use std::borrow::Cow;
+use std::{borrow::Cow, sync::Arc};
 
 use nalgebra::{DMatrix, DVector};
 
@@ -55,7 +55,6 @@ const FEW: f64 = 0.1;
 /// A sum of terms, with its fit.
 pub(crate) struct Sum {
     pub(crate) terms: Vec<Term>,
-    pub(crate) columns: Vec<Column>,
     pub(crate) products: Products,
     pub(crate) fit: Fit,
     /// Number of terms in the library.
@@ -101,18 +100,12 @@ struct Pursuit<'a, 'b> {
 
 /// Chooses a sum of terms for a residual; `roles` defines the samples for fitting and for choosing.
 pub(crate) fn pursue(residue: &Residue<'_>, roles: &SampleRoles, is_commanded: bool) -> Sum {
-    let products = residue.products(roles, &residue.residual);
+    let products = residue.products(roles, &residue.residual, &[]);
     let fit = residue.solve(&products, &residue.model, true);
     let terms = library(&residue.inputs, roles, is_commanded);
     let count = (roles.count(Role::Fit) / SCREENED).max(1);
-    let sum = Sum {
-        terms: Vec::new(),
-        columns: Vec::new(),
-        products,
-        fit,
-        library: terms.len(),
-        beside_many: Vec::new(),
-    };
+    let library = terms.len();
+    let sum = Sum { terms: Vec::new(), products, fit, library, beside_many: Vec::new() };
     let shelf = terms.into_iter().map(|term| {
         let values = residue.values(&term);
         (term, means(roles, Role::Fit, &values, count))
@@ -132,7 +125,6 @@ pub(crate) fn pursue(residue: &Residue<'_>, roles: &SampleRoles, is_commanded: b
         }
         pursuit.clean(&best.column);
         pursuit.sum.terms.push(best.term);
-        pursuit.sum.columns.push(best.column);
         (pursuit.sum.products, pursuit.sum.fit) = (best.products, best.fit);
     }
     pursuit.sum
@@ -141,7 +133,7 @@ pub(crate) fn pursue(residue: &Residue<'_>, roles: &SampleRoles, is_commanded: b
 /// A sum with one more term.
 struct Next {
     term: Term,
-    column: Column,
+    column: Arc<Column>,
     products: Products,
     fit: Fit,
 }
@@ -226,12 +218,8 @@ impl Pursuit<'_, '_> {
     }
 
     fn next(&self, term: Term) -> Option<Next> {
-        let column = self.residue.column(&term)?;
-        let before: Vec<&Column> = std::iter::once(&self.residue.residual)
-            .chain(self.residue.columns())
-            .chain(&self.sum.columns)
-            .collect();
-        let products = self.residue.with(self.roles, &self.sum.products, &before, &column);
+        let column = Arc::new(self.residue.column(&term)?);
+        let products = self.residue.with(self.roles, &self.sum.products, &column);
         let fit = self.residue.solve(&products, &self.residue.model, true);
         fit.cost.is_finite().then_some(Next { term, column, products, fit })
     }

@@ -5,6 +5,8 @@
 //! serialised ([`serde`]) together with the scales of their signals, so that they can be added to a
 //! simulator.
 
+use std::f64::consts::TAU;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use stretch_effects::{Backlash, MeanReversion, Operator, Span, Start};
@@ -130,8 +132,7 @@ impl Term {
 
     /// Returns the shapes (widths, times, knees) that may be refined.
     pub(crate) fn shapes(&self) -> Vec<f64> {
-        let mut copy = self.clone();
-        copy.shapes_mut().into_iter().map(|(x, _)| *x).collect()
+        self.clone().shapes_mut().into_iter().map(|(x, _)| *x).collect()
     }
 
     /// Returns the longest time constant or delay of the term, s; 0 if it has none.
@@ -145,9 +146,7 @@ impl Term {
     /// nothing.
     pub(crate) fn with_shape(&self, index: usize, value: f64) -> Self {
         let mut copy = self.clone();
-        if let Some((shape, _)) = copy.shapes_mut().into_iter().nth(index) {
-            *shape = value;
-        }
+        copy.shapes_mut().into_iter().skip(index).take(1).for_each(|(shape, _)| *shape = value);
         copy
     }
 
@@ -199,93 +198,77 @@ impl Factor {
         }
     }
 
+    /// Returns the index of its signal; `None` for a function of time.
+    pub(super) fn signal(self) -> Option<usize> {
+        match self {
+            Self::Power { signal, .. }
+            | Self::Centred { signal, .. }
+            | Self::Above { signal, .. }
+            | Self::Below { signal, .. }
+            | Self::Low { signal, .. }
+            | Self::High { signal, .. }
+            | Self::Sine { signal, .. }
+            | Self::Cosine { signal, .. }
+            | Self::Rate { signal, .. }
+            | Self::Bend { signal }
+            | Self::Play { signal, .. }
+            | Self::Lag { signal, .. }
+            | Self::Late { signal, .. }
+            | Self::Peak { signal }
+            | Self::Turned { signal, .. }
+            | Self::Travel { signal, .. }
+            | Self::TravelFade { signal, .. } => Some(signal),
+            Self::Time { .. } | Self::TimeFade { .. } | Self::Session { .. } => None,
+        }
+    }
+
     fn in_trial(self, inputs: &TermInputs, trial: usize, out: &mut [f64]) {
         let range = inputs.trials[trial].clone();
         let dt_s = inputs.grid.dt_s();
-        let signal = |i: usize| {
-            let Signal { x, v, .. } = &inputs.signals[i];
-            (&x[range.clone()], &v[range.clone()])
-        };
+        let own = self.signal().map(|signal| &inputs.signals[signal]);
+        let of = |values: fn(&Signal) -> &[f64]| own.map_or(&[][..], |s| &values(s)[range.clone()]);
+        let (x, v) = (of(|s| &s.x), of(|s| &s.v));
+        let first = x.first().copied().unwrap_or(0.0);
         let mut each = |of: &mut dyn FnMut(usize) -> f64| {
             out.iter_mut().enumerate().for_each(|(i, out)| *out *= of(i));
         };
         match self {
-            Self::Power { signal: s, power } => {
-                let x = signal(s).0;
-                each(&mut |i| raised(x[i].max(0.0), power));
-            }
-            Self::Centred { signal: s, at, power } => {
-                let x = signal(s).0;
-                each(&mut |i| (x[i] - at).powi(power));
-            }
-            Self::Above { signal: s, at, power } => {
-                let x = signal(s).0;
-                each(&mut |i| raised((x[i] - at).max(0.0), power));
-            }
-            Self::Below { signal: s, at, power } => {
-                let x = signal(s).0;
-                each(&mut |i| raised((at - x[i]).max(0.0), power));
-            }
-            Self::Low { signal: s, width } => {
-                let x = signal(s).0;
-                each(&mut |i| (-x[i].max(0.0) / width).exp());
-            }
-            Self::High { signal: s, width } => {
-                let x = signal(s).0;
-                each(&mut |i| (-(1.0 - x[i]).max(0.0) / width).exp());
-            }
-            Self::Sine { signal: s, turns } => {
-                let x = signal(s).0;
-                each(&mut |i| (std::f64::consts::TAU * turns * x[i]).sin());
-            }
-            Self::Cosine { signal: s, turns } => {
-                let x = signal(s).0;
-                each(&mut |i| (std::f64::consts::TAU * turns * x[i]).cos());
-            }
-            Self::Rate { signal: s, form } => {
-                let v = signal(s).1;
-                each(&mut |i| form.of(v[i]));
-            }
-            Self::Bend { signal: s } => {
-                let v = signal(s).1;
-                each(&mut |i| if i > 0 { v[i] - v[i - 1] } else { 0.0 });
-            }
-            Self::Play { signal: s, width } => {
-                let x = signal(s).0;
+            Self::Power { power, .. } => each(&mut |i| raised(x[i].max(0.0), power)),
+            Self::Centred { at, power, .. } => each(&mut |i| (x[i] - at).powi(power)),
+            Self::Above { at, power, .. } => each(&mut |i| raised((x[i] - at).max(0.0), power)),
+            Self::Below { at, power, .. } => each(&mut |i| raised((at - x[i]).max(0.0), power)),
+            Self::Low { width, .. } => each(&mut |i| (-x[i].max(0.0) / width).exp()),
+            Self::High { width, .. } => each(&mut |i| (-(1.0 - x[i]).max(0.0) / width).exp()),
+            Self::Sine { turns, .. } => each(&mut |i| (TAU * turns * x[i]).sin()),
+            Self::Cosine { turns, .. } => each(&mut |i| (TAU * turns * x[i]).cos()),
+            Self::Rate { form, .. } => each(&mut |i| form.of(v[i])),
+            Self::Bend { .. } => each(&mut |i| if i > 0 { v[i] - v[i - 1] } else { 0.0 }),
+            Self::Play { width, .. } => {
                 let play = ran(&Backlash::hard(width), inputs, x);
                 each(&mut |i| x[i] - play[i]);
             }
-            Self::Lag { signal: s, tau_s } => {
-                let x = signal(s).0;
-                let lag = lagged(inputs, x, tau_s, x.first().copied().unwrap_or(0.0));
+            Self::Lag { tau_s, .. } => {
+                let lag = lagged(inputs, x, tau_s, first);
                 each(&mut |i| x[i] - lag[i]);
             }
-            Self::Late { signal: s, delay_s } => {
-                let x = signal(s).0;
-                let by = delay_s / dt_s;
-                each(&mut |i| late(x, i, by) - x[i]);
-            }
-            Self::Peak { signal: s } => {
-                let x = signal(s).0;
+            Self::Late { delay_s, .. } => each(&mut |i| late(x, i, delay_s / dt_s) - x[i]),
+            Self::Peak { .. } => {
                 let mut most = f64::NEG_INFINITY;
                 each(&mut |i| {
                     most = most.max(x[i]);
                     most - x[i]
                 });
             }
-            Self::Turned { signal: s, width } => {
-                let x = signal(s).0;
-                let mut turns = Turns::at(x.first().copied().unwrap_or(0.0));
+            Self::Turned { width, .. } => {
+                let mut turns = Turns::at(first);
                 each(&mut |i| turns.follow(x[i], width));
             }
-            Self::Travel { signal: s, power } => {
+            Self::Travel { power, .. } => {
                 let mut travel = Travel::default();
-                let x = signal(s).0;
                 each(&mut |i| raised(travel.follow(x, i), power));
             }
-            Self::TravelFade { signal: s, width } => {
+            Self::TravelFade { width, .. } => {
                 let mut travel = Travel::default();
-                let x = signal(s).0;
                 each(&mut |i| (-travel.follow(x, i) / width).exp());
             }
             Self::Time { power } => each(&mut |i| raised(i as f64 * dt_s / inputs.trial_s, power)),
@@ -393,7 +376,7 @@ impl Passage {
                     let open: Vec<&[f64]> = inputs
                         .signals
                         .iter()
-                        .filter(|s| s.is_command)
+                        .filter(|s| s.spec.is_command)
                         .map(|s| &s.x[range.clone()])
                         .collect();
                     let mut z = 0.0;

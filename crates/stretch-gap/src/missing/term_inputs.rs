@@ -15,24 +15,21 @@ use stretch_effects::Grid;
 
 use stretch_data::ends;
 
-use crate::problem::{
-    error::GapError,
-    record_facts::Recorded,
-    sample_roles::{Role, SampleRoles},
-    simulator::Simulator,
-    spec::TrialSpec,
+use crate::{
+    missing::proposed::SignalScale,
+    problem::{
+        error::GapError,
+        record_facts::Recorded,
+        sample_roles::{Role, SampleRoles, Segment},
+        simulator::Simulator,
+        spec::TrialSpec,
+    },
 };
 
 /// A recorded signal, scaled.
 #[derive(Debug, Clone)]
 pub(crate) struct Signal {
-    pub(crate) name: String,
-    pub(crate) unit: String,
-    pub(crate) offset: f64,
-    pub(crate) scale: f64,
-    /// Divisor that turns dx/dt into v, 1/s.
-    pub(crate) rate: f64,
-    pub(crate) is_command: bool,
+    pub(crate) spec: SignalScale,
     /// x, all trials concatenated.
     pub(crate) x: Vec<f64>,
     /// v, all trials concatenated.
@@ -43,7 +40,7 @@ impl Signal {
     /// Returns the value of x about which odd and even curves are centred: the x of a signal of
     /// zero if the fitted range contains it, otherwise the middle of that range.
     pub(crate) fn centre(&self) -> f64 {
-        let zero = -self.offset / self.scale;
+        let zero = -self.spec.offset / self.spec.scale;
         if (0.0..=1.0).contains(&zero) { zero } else { 0.5 }
     }
 }
@@ -86,7 +83,7 @@ impl TermInputs {
         let grid = Grid::samples(dt_s).map_err(|e| GapError::simulator(e.to_string()))?;
         let first_s = trials.first().map_or(0.0, |t| t.start_s);
         let fitted = || roles.of_role(Role::Fit);
-        let end_s = |s: &crate::problem::sample_roles::Segment| {
+        let end_s = |s: &Segment| {
             let trial = &ranges[s.trial];
             trials[s.trial].start_s - first_s + (s.to - trial.start) as f64 * dt_s
         };
@@ -120,7 +117,7 @@ impl TermInputs {
 
     /// Returns the indices of the signals that are commands (`commands` true) or are not.
     pub(crate) fn of_kind(&self, commands: bool) -> Vec<usize> {
-        (0..self.signals.len()).filter(|&i| self.signals[i].is_command == commands).collect()
+        (0..self.signals.len()).filter(|&i| self.signals[i].spec.is_command == commands).collect()
     }
 
     /// Returns the quantile `share` (0 to 1) of x over the fitted samples.
@@ -176,7 +173,8 @@ impl Signal {
         }
         let rate = (sum / f64::max(count, 1.0)).sqrt().max(f64::MIN_POSITIVE);
         v.iter_mut().for_each(|v| *v /= rate);
-        Some(Self { name, unit, offset, scale, rate, is_command, x: values, v })
+        let spec = SignalScale { name, unit, offset, scale, rate_per_s: rate, is_command };
+        Some(Self { spec, x: values, v })
     }
 }
 

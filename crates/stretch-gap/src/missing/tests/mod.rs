@@ -7,7 +7,10 @@ mod weighing;
 mod words;
 
 use crate::{
-    missing::term_inputs::{Signal, TermInputs, central_differences},
+    missing::{
+        SignalScale,
+        term_inputs::{Signal, TermInputs, central_differences},
+    },
     problem::sample_roles::{Role, SampleRoles, Segment},
 };
 use stretch_effects::Grid;
@@ -19,7 +22,8 @@ const DT_S: f64 = 0.01;
 fn signal(name: &str, x: Vec<f64>, is_command: bool) -> Signal {
     let v = central_differences(&x, DT_S);
     let (name, unit) = (name.to_owned(), "mm".to_owned());
-    Signal { name, unit, offset: 40.0, scale: 25.0, rate: 1.0, is_command, x, v }
+    let spec = SignalScale { name, unit, offset: 40.0, scale: 25.0, rate_per_s: 1.0, is_command };
+    Signal { spec, x, v }
 }
 
 /// Signals over trials with the given numbers of samples, starting one minute apart.

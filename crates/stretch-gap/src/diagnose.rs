@@ -22,21 +22,15 @@ use crate::{
     numerics::stopwatch::Stopwatch,
     options::{Options, threads},
     problem::{
-        altered_parameters::Altered,
+        altered::Altered,
         error::{GapError, if_possible},
         simulator::Simulator,
     },
-    record::{
-        columns_alone::columns_alone,
-        examine::Doubts,
-        gross::{Gross, weigh_errors},
-        suspect::Suspect,
-    },
+    record::{columns_alone::columns_alone, examine, gross::Gross},
     search::{
         baselines::baselines,
-        command_timing,
-        re_estimate::re_estimated,
         selection::{Found, Looked, Search},
+        variants::{between_rows, likelier, re_estimated},
     },
     verdict::{
         answer::{Answer, Findings},
@@ -102,8 +96,9 @@ fn run(task: Task<'_>) -> Result<(Diagnosis, Evidence), GapError> {
     let columns = columns_alone(&simulator.columns(), simulator.trials(), simulator.dt_s());
     let examines_effects = task.examines_effects && columns.is_empty();
     let task = Task { examines_effects, ..task };
-    let between_rows = command_timing::between_rows(simulator);
-    let (problem, from) = prepare(task, between_rows.as_ref())?;
+    let between_rows = between_rows(simulator);
+    let between_rows = between_rows.as_ref().map(|other| -> &dyn Simulator { other });
+    let (problem, from) = prepare(task, between_rows)?;
     let spare = simulator.model_runs().map(|_| Searched::without(problem.clone()));
     if let Some(spare) = &spare {
         make_runs_of_answer(task, spare.cause(&columns))?;
@@ -135,10 +130,14 @@ fn answered<'a>(
     begun: &Stopwatch,
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let searched = search(task, problem, from)?;
-    let suspect = Suspect::of(searched.problem.simulator());
+    let suspect = Altered::with_errors(searched.problem.simulator());
     let doubted = searched.problem.beside(&suspect).with_reserve(false);
-    let error = match columns.is_empty() {
-        true => doubt(task, &searched, (&doubted, &suspect))?,
+    let error = match columns.is_empty() && !searched.problem.is_spent() {
+        true => {
+            (task.progress)("testing for errors of the recording");
+            let best = &searched.found.best;
+            if_possible(examine(&doubted, &suspect, best, &task.options.thresholds))?.flatten()
+        }
         false => None,
     };
     let cause = match &error {
@@ -167,13 +166,13 @@ fn concluded(
 /// returns the set of effects from which the search continues.
 fn prepare<'a>(
     task: Task<'a>,
-    between_rows: Option<&'a Altered<'a>>,
+    between_rows: Option<&'a dyn Simulator>,
 ) -> Result<(PreparedProblem<'a>, Hypothesis), GapError> {
     let Task { simulator, options, progress, stop, .. } = task;
     let at_rows = PreparedProblem::prepare(simulator, stop, options.seed, progress)?;
     let at_rows = at_rows.retuned_from_starts(options.thresholds.least_gap, options.seed)?;
     let limits = (&options.thresholds, task.depth());
-    command_timing::likelier(at_rows, between_rows, limits, options.seed, progress)
+    likelier(at_rows, between_rows, limits, options.seed, progress)
 }
 
 /// Result of a search, with the problem prepared for the nuisances (drift and offsets) estimated
@@ -286,26 +285,6 @@ fn search<'a>(
     };
     let problem = problem.with_reserve(true);
     Ok(Searched { problem, found, eliminated, tried, looked, is_lost: false })
-}
-
-/// Tests whether errors of the recording or of the rig file explain more than the best set of
-/// effects. Returns these errors, and the search result with the first of them in place of the set.
-/// Each of these errors has one parameter and leaves only noise. `None` if the set of effects
-/// explains more, or if no more runs may be made.
-fn doubt(
-    task: Task<'_>,
-    searched: &Searched<'_>,
-    (doubted, suspect): (&PreparedProblem<'_>, &Suspect<'_>),
-) -> Result<Option<(Vec<Gross>, Found)>, GapError> {
-    let (thresholds, found) = (&task.options.thresholds, &searched.found);
-    (task.progress)("testing for errors of the recording");
-    if searched.problem.is_spent() {
-        return Ok(None);
-    }
-    let doubts = Doubts::of(doubted, suspect, thresholds)
-        .and_then(|doubts| doubts.closer_if(doubted, suspect, found, thresholds));
-    let Some(doubts) = if_possible(doubts)? else { return Ok(None) };
-    Ok(weigh_errors(doubted, suspect, doubts.errors, found, thresholds))
 }
 
 /// Returns the detection limit of each effect; empty if effects are not examined or no more runs

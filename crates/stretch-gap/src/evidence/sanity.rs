@@ -26,7 +26,7 @@ use crate::{
         score::{gap, mean_square},
     },
     problem::{
-        altered_parameters::Altered,
+        altered::Altered,
         error::{GapError, unless_lost},
         sample_roles::Role,
         spec::ParameterSpec,

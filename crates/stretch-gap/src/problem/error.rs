@@ -135,12 +135,6 @@ impl std::error::Error for Asked {
 }
 
 impl GapError {
-    /// Whether this error ends the diagnosis. Other errors only exclude the candidate whose values
-    /// could not be simulated.
-    pub(crate) fn ends_all(&self) -> bool {
-        matches!(self, Self::Stopped | Self::Broken(_))
-    }
-
     /// Whether a run failed or the budget is used up. The diagnosis may then continue without that
     /// result.
     ///

@@ -4,15 +4,16 @@
 //! [`description::Description`] of its stages, parameters, effects and trials ([`spec`]), its noise
 //! ([`noise`]), and facts about the recording ([`record_facts`], [`mod@column`]). Output: the
 //! fitted, held-out and test samples (`sample_roles`), and model runs that are counted, can be
-//! stopped, and return finite values ([`runs`]). Two simulators wrap another: one alters parameters
-//! ([`altered_parameters`]), the other corrects a column (in `record`). [`thresholds`] are the
-//! calibrated thresholds of the decisions. Imports: only `numerics`.
+//! stopped, and return finite values ([`runs`]). One simulator wraps another ([`altered`]): with
+//! other tolerances, or with errors of the recording ([`fault`]). [`thresholds`] are the calibrated
+//! thresholds of the decisions. Imports: only `numerics`.
 
-pub(crate) mod altered_parameters;
+pub(crate) mod altered;
 pub(crate) mod checks;
 pub(crate) mod column;
 pub(crate) mod description;
 pub(crate) mod error;
+pub(crate) mod fault;
 pub(crate) mod linked_stages;
 pub(crate) mod noise;
 mod pace;

@@ -4,7 +4,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::{
     problem::{
-        altered_parameters::Altered,
+        altered::Altered,
         error::GapError,
         linked_stages::{groups, linked},
         runs::Runs,

@@ -14,8 +14,13 @@
 use stretch_data::ends;
 
 use crate::{
-    problem::{column::Column, noise::take_waves_out, spec::TrialSpec},
-    record::{fault::DELAY_S, gross::Gross},
+    problem::{
+        column::Column,
+        fault::DELAY_S,
+        noise::{median, take_waves_out},
+        spec::TrialSpec,
+    },
+    record::gross::Gross,
 };
 
 /// Largest residual of a copy, as a share of the standard deviation that independent noises would
@@ -55,15 +60,8 @@ pub(crate) fn columns_alone(columns: &[Column<'_>], trials: &[TrialSpec], dt_s: 
         }
     }
     let Some(shortest) = own.iter().map(|c| c.values.len()).min() else { return out };
-    let mut from = 0;
-    let bounds: Vec<(usize, usize)> = trials
-        .iter()
-        .map(|trial| {
-            from += trial.samples;
-            (from - trial.samples, from)
-        })
-        .filter(|(_, to)| *to <= shortest)
-        .collect();
+    let ranges = TrialSpec::ranges(trials).into_iter().map(|range| (range.start, range.end));
+    let bounds: Vec<(usize, usize)> = ranges.filter(|(_, to)| *to <= shortest).collect();
     for (i, column) in own.iter().enumerate() {
         let others: Vec<&[f64]> =
             own.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, c)| &*c.values).collect();
@@ -89,16 +87,11 @@ pub(crate) fn columns_alone(columns: &[Column<'_>], trials: &[TrialSpec], dt_s: 
 fn noise(values: &[f64]) -> (f64, f64) {
     let of = |weights: &[f64]| {
         let power: f64 = weights.iter().map(|w| w * w).sum();
-        let mut squares: Vec<f64> = values
-            .windows(weights.len())
-            .map(|w| w.iter().zip(weights).map(|(x, w)| x * w).sum::<f64>().powi(2) / power)
-            .collect();
-        let middle = squares.len() / 2;
-        match squares.is_empty() {
-            true => 0.0,
-            // The median of a squared normal variable is 0.4549 of its mean.
-            false => (*squares.select_nth_unstable_by(middle, f64::total_cmp).1 / 0.4549).sqrt(),
-        }
+        let bends = values.windows(weights.len());
+        let bends = bends.map(|w| w.iter().zip(weights).map(|(x, w)| x * w).sum::<f64>());
+        let squares = bends.map(|bend| bend.powi(2) / power).collect();
+        // The median of a squared normal variable is 0.4549 of its mean.
+        (median(squares).unwrap_or(0.0) / 0.4549).sqrt()
     };
     (of(&[1.0, -2.0, 1.0]), of(&[1.0, -4.0, 6.0, -4.0, 1.0]))
 }

@@ -1,28 +1,28 @@
-//! Examines every possible error of the recording and of the rig file, and fits those that could
-//! explain most of a gap.
-
-use std::collections::BTreeMap;
+//! Examines every possible error of the recording and of the rig file, fits those that could
+//! explain most of a gap, and compares them with the effects.
 
 use rayon::prelude::*;
+use stretch_data::ends;
 
 use crate::{
     fit::{
+        coordinate::REACH,
         hypothesis::Hypothesis,
         levenberg_marquardt::{COARSE, Effort, FINE, possible},
         prepared::PreparedProblem,
     },
     problem::{
+        altered::Altered,
         error::GapError,
+        fault::Kind,
         simulator::{Model, Simulator},
         thresholds::Thresholds,
     },
     record::{
-        fault::{Kind, span},
-        gross::allowed_gap,
-        screen::{Bench, END, Promising, REACH},
-        suspect::Suspect,
+        gross::Gross,
+        screen::{Bench, END, Promising},
     },
-    search::{screen::Ground, selection::Found},
+    search::{selection::Found, sets::Sets},
 };
 
 /// Smallest share of the gap in its stages that an error must promise to close according to the
@@ -42,110 +42,121 @@ const LEAST: f64 = 0.03;
 const LEAST_SAMPLES: f64 = 2.0;
 /// Number of standard deviations by which the size of an error must exceed what is allowed.
 const SURE: f64 = 3.0;
+/// Marks an alternative that replaces the whole set and not one of its effects.
+const WHOLE: usize = usize::MAX;
+/// The share of the gap that an error may leave, divided by that of a set of effects, whose forms
+/// differ from those of the rig.
+const EXACT: f64 = 0.1;
+/// Difference of scores, in nats, within which two errors are tied.
+const TIE: f64 = 1.1;
 
-/// Errors that were screened and errors that were fitted, each fitted together with the nominal
-/// parameters.
-#[derive(Debug, Default)]
-pub(crate) struct Doubts {
-    looked: Vec<Promising>,
-    /// Fitted errors that exceed tolerances, instrument accuracy and known effects; the best first.
-    pub(crate) errors: Vec<Hypothesis>,
+/// Compares errors of the recording with the best set of effects. If errors win, returns those that
+/// tie for the best, as they are reported, and the search result with the best error instead of the
+/// effects. Returns `None` if the effects win. `problem` is the prepared problem of `suspect`.
+///
+/// The form of an error is exactly known and has one parameter, so the right error leaves almost
+/// only noise. An error wins if its score is higher than that of the best set of effects and if it
+/// leaves much less of the gap ([`EXACT`]) than a named set may leave.
+pub(crate) fn examine(
+    problem: &PreparedProblem<'_>,
+    suspect: &Altered<'_>,
+    best: &Hypothesis,
+    thresholds: &Thresholds,
+) -> Result<Option<(Vec<Gross>, Found)>, GapError> {
+    let allowed = |share: f64| thresholds.unknown_excess + share * problem.gap(&problem.nominal);
+    let most = allowed(EXACT * thresholds.unknown_share);
+    let least = best.score.max(thresholds.rise);
+    let is_close = problem.gap(best) <= allowed(thresholds.unknown_share);
+    let beside = if is_close && !is_strained(problem, &best.model) { None } else { Some(best) };
+    let mut errors = errors(problem, suspect, beside, thresholds)?.into_iter();
+    let mut above = errors.by_ref().filter(|e| e.score > least && problem.gap(e) <= most);
+    let Some(first) = above.next() else { return Ok(None) };
+    let (tied, behind): (Vec<Hypothesis>, Vec<Hypothesis>) =
+        above.partition(|e| e.score > first.score - TIE);
+    let told = std::iter::once(&first).chain(&tied).filter_map(|e| Gross::found(suspect, e));
+    let mut gross: Vec<Gross> = told.collect();
+    // If the data cannot distinguish several errors, a factor between two units comes first.
+    gross.sort_by_key(|g| g.units.is_none());
+    let rivals = tied.into_iter().chain(behind).chain([best.clone()]);
+    let rivals = rivals.map(|rival| (WHOLE, rival)).collect();
+    Ok(Some((gross, Found { best: first, rivals })))
 }
 
-impl Doubts {
-    /// Screens every error and fits those that could explain most of a gap. `problem` is the
-    /// prepared problem of `suspect`.
-    pub(crate) fn of(
-        problem: &PreparedProblem<'_>,
-        suspect: &Suspect<'_>,
-        thresholds: &Thresholds,
-    ) -> Result<Self, GapError> {
-        if problem.gap(&problem.nominal) <= thresholds.null_excess
-            && !is_strained(problem, &problem.nominal.model)
-        {
-            return Ok(Self::default());
-        }
-        let ground = Ground::around(&problem.compare, problem.nominal.model.clone())?;
-        let bench = Bench::new(problem, suspect, &ground)?;
-        let all: Result<Vec<Option<Promising>>, GapError> =
-            (0..suspect.faults().len()).into_par_iter().map(|fault| bench.look(fault)).collect();
-        let looked: Vec<Promising> = all?.into_iter().flatten().collect();
-        // `least` converts the required rise of the score to a sum of squares, by the number of
-        // samples per independent observation.
-        let least = 2.0 * thresholds.rise * problem.finest() * problem.compare.roles.block as f64;
-        let counts = |p: &&Promising| p.share > MOST && p.fall > least;
-        let mut promising: Vec<&Promising> = looked.iter().filter(counts).collect();
-        promising.sort_by(|a, b| b.fall.total_cmp(&a.fall));
-        let most = promising.first().map_or(0.0, |p| p.fall);
-        promising.retain(|p| p.fall >= NEAR * most);
-        promising.truncate(FITTED);
-        let fits = promising.par_iter().map(|p| fitted(problem, suspect, p.fault, &p.start, FINE));
-        let errors = sorted(suspect, possible(fits)?);
-        Ok(Self { looked, errors })
+/// Screens every error, and fits those that could explain most of a gap, each together with the
+/// nominal parameters. Returns the errors that exceed tolerances, instrument accuracy and known
+/// effects, the best first.
+///
+/// `beside` is the best set of effects if it does not suffice: it leaves a large gap, or parameters
+/// at the ends of their tolerances. Errors in the stage with the largest residual are then fitted
+/// as well, because a linearisation predicts large errors poorly: coarsely at first, starting where
+/// possible from the rig as shipped, and the best of them to convergence.
+fn errors(
+    problem: &PreparedProblem<'_>,
+    suspect: &Altered<'_>,
+    beside: Option<&Hypothesis>,
+    thresholds: &Thresholds,
+) -> Result<Vec<Hypothesis>, GapError> {
+    if problem.gap(&problem.nominal) <= thresholds.null_excess
+        && !is_strained(problem, &problem.nominal.model)
+    {
+        return Ok(Vec::new());
     }
-
-    /// Fits more errors if the best set of effects leaves a gap larger than [`allowed_gap`], or if
-    /// parameters are at the ends of their tolerances.
-    pub(crate) fn closer_if(
-        mut self,
-        problem: &PreparedProblem<'_>,
-        suspect: &Suspect<'_>,
-        found: &Found,
-        thresholds: &Thresholds,
-    ) -> Result<Self, GapError> {
-        let best = &found.best;
-        if problem.gap(best) > allowed_gap(problem, thresholds) || is_strained(problem, &best.model)
-        {
-            self.closer(problem, suspect, best)?;
-        }
-        Ok(self)
-    }
-
-    /// Fits errors in the stage with the largest residual coarsely, starting where possible from
-    /// the rig as shipped, and the best of them to convergence. The screen is not sufficient here,
-    /// because a linearisation predicts large errors poorly.
-    fn closer(
-        &mut self,
-        problem: &PreparedProblem<'_>,
-        suspect: &Suspect<'_>,
-        best: &Hypothesis,
-    ) -> Result<(), GapError> {
+    let bench = Bench::new(problem, suspect)?;
+    let all: Result<Vec<Option<Promising>>, GapError> =
+        (0..suspect.faults.len()).into_par_iter().map(|fault| bench.look(fault)).collect();
+    let mut looked: Vec<Promising> = all?.into_iter().flatten().collect();
+    looked.sort_by(|a, b| b.fall.total_cmp(&a.fall));
+    // `least` converts the required rise of the score to a sum of squares, by the number of samples
+    // per independent observation.
+    let least = 2.0 * thresholds.rise * problem.finest() * problem.compare.roles.block as f64;
+    let counts = |p: &&Promising| p.share > MOST && p.fall > least;
+    let most = looked.iter().find(counts).map_or(0.0, |p| p.fall);
+    let promising = looked.iter().filter(counts).filter(|p| p.fall >= NEAR * most).take(FITTED);
+    let starts = promising.map(|p| (p.fault, &p.starts[0])).collect();
+    let mut errors = fitted(problem, suspect, starts, FINE)?;
+    if let Some(best) = beside {
         let stages = 0..problem.compare.metrics.len();
         let gap = |stage: &usize| problem.gap_in(best, *stage);
-        let Some(worst) = stages.max_by(|a, b| gap(a).total_cmp(&gap(b))) else { return Ok(()) };
+        let worst = stages.max_by(|a, b| gap(a).total_cmp(&gap(b)));
         let is_new = |p: &&Promising| {
-            let effect = suspect.index(p.fault);
-            suspect.faults()[p.fault].touches.contains(&worst)
-                && self.errors.iter().all(|e| e.effects != [effect])
+            let touches = &suspect.faults[p.fault].spec.touches;
+            worst.is_some_and(|worst| touches.contains(&worst))
+                && errors.iter().all(|e| e.effects != [suspect.index(p.fault)])
         };
-        let large = |model: &Model| is_large(suspect, model, 0.0);
-        let starts = self.looked.iter().filter(is_new).flat_map(|p| {
-            let plain = p.plain.as_ref().filter(|model| large(model));
-            plain.or(Some(&p.start).filter(|model| large(model))).map(|model| (p.fault, model))
+        let large = |model: &&Model| is_large(suspect, model, 0.0);
+        let coarse = looked.iter().filter(is_new).filter_map(|p| {
+            let [start, plain] = &p.starts;
+            Some((p.fault, [plain, start].into_iter().find(large)?))
         });
-        let starts: Vec<(usize, &Model)> = starts.collect();
-        let fits =
-            starts.par_iter().map(|(fault, start)| fitted(problem, suspect, *fault, start, COARSE));
-        let mut coarse = sorted(suspect, possible(fits)?);
-        coarse.truncate(POLISHED);
-        let fits = coarse.par_iter().map(|one| {
-            fitted(problem, suspect, one.effects[0] - suspect.index(0), &one.model, FINE)
-        });
-        self.errors.extend(possible(fits)?);
-        self.errors = sorted(suspect, std::mem::take(&mut self.errors));
-        Ok(())
+        let coarse = fitted(problem, suspect, coarse.collect(), COARSE)?;
+        let best = coarse.iter().take(POLISHED);
+        let best = best.map(|one| (one.effects[0] - suspect.index(0), &one.model)).collect();
+        errors.extend(fitted(problem, suspect, best, FINE)?);
+        errors.sort_by(|a, b| b.score.total_cmp(&a.score));
     }
+    Ok(errors)
 }
 
-/// Keeps the errors that are larger than tolerances and instruments allow, and sorts them with the
-/// best first.
-fn sorted(suspect: &Suspect<'_>, mut found: Vec<Hypothesis>) -> Vec<Hypothesis> {
+/// Fits errors from their starts. Returns those that are larger than tolerances and instruments
+/// allow, the best first.
+fn fitted(
+    problem: &PreparedProblem<'_>,
+    suspect: &Altered<'_>,
+    starts: Vec<(usize, &Model)>,
+    effort: Effort,
+) -> Result<Vec<Hypothesis>, GapError> {
+    let sets = Sets::new(problem);
+    let mut found = possible(starts.into_par_iter().map(|(fault, start)| {
+        let stages = &suspect.faults[fault].spec.touches;
+        let fitted = problem.fit(stages, start.clone(), &[], effort)?;
+        Ok(sets.join(&problem.nominal, vec![suspect.index(fault)], stages, fitted))
+    }))?;
     found.retain(|one| {
         let sd = one.effect_sd.values().flatten().copied().fold(0.0, f64::max);
         is_large(suspect, &one.model, sd)
     });
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
-    found
+    Ok(found)
 }
 
 /// Whether any stage has two parameters at an end of their tolerances, or one such parameter whose
@@ -162,54 +173,26 @@ fn is_strained(problem: &PreparedProblem<'_>, model: &Model) -> bool {
     })
 }
 
-fn fitted(
-    problem: &PreparedProblem<'_>,
-    suspect: &Suspect<'_>,
-    fault: usize,
-    start: &Model,
-    effort: Effort,
-) -> Result<Hypothesis, GapError> {
-    let effect = suspect.index(fault);
-    let stages = &suspect.faults()[fault].touches;
-    let fitted = problem.fit(stages, start.clone(), &[], effort)?;
-    let mut found = Hypothesis {
-        effects: vec![effect],
-        effect_sd: BTreeMap::from([(effect, fitted.effect_sd.concat())]),
-        ..problem.nominal.clone()
-    };
-    for &stage in stages {
-        for &p in &problem.simulator().stages()[stage].parameters {
-            found.model.parameters[p] = fitted.model.parameters[p];
-        }
-    }
-    fitted.parameter_sd.iter().for_each(|(p, sd)| found.parameter_sd[*p] = *sd);
-    found.model.effects = fitted.model.effects;
-    for misfit in fitted.misfits {
-        let stage = misfit.stage;
-        found.misfits[stage] = misfit;
-    }
-    found.score = problem.score(&found.misfits, &found.model);
-    Ok(found)
-}
-
 /// Whether the error of a model, with the standard deviation `sd` of its size, exceeds tolerances,
 /// instrument accuracy and known effects.
-fn is_large(suspect: &Suspect<'_>, model: &Model, sd: f64) -> bool {
+fn is_large(suspect: &Altered<'_>, model: &Model, sd: f64) -> bool {
     let Some((fault, size)) = suspect.error_of(model) else { return false };
-    let column = fault.column.map(|c| &suspect.columns()[c]);
-    let sure = |least: f64| size.abs() - SURE * sd > least;
+    let column = fault.column.map(|c| &suspect.columns[c]);
+    let sure = |size: f64, least: f64| size.abs() - SURE * sd > least;
     match (fault.kind, column) {
         (Kind::Parameter(p), _) => {
             let spec = &suspect.description().parameters[p];
-            let value = model.parameters[p] * (1.0 + size);
-            (value - spec.nominal).abs() > REACH * spec.sd
+            (model.parameters[p] * size - spec.nominal).abs() > REACH * spec.sd
         }
-        (Kind::Scale, _) => fault.is_beyond() || sure(LEAST),
-        (Kind::Offset, Some(column)) => sure(LEAST * span(&column.values)),
+        (Kind::Scale, _) => fault.is_beyond(size) || sure(size - 1.0, LEAST),
+        (Kind::Offset, Some(column)) => {
+            let (low, high) = ends(&*column.values);
+            sure(size, LEAST * (high - low))
+        }
         (Kind::Delay, Some(column)) => {
             let [early, late] = column.skew_s;
             let is_skew = (early - SURE * sd..=late + SURE * sd).contains(&size);
-            sure(LEAST_SAMPLES * suspect.description().dt_s) && !is_skew
+            sure(size, LEAST_SAMPLES * suspect.description().dt_s) && !is_skew
         }
         (Kind::Sign, _) => true,
         _ => false,

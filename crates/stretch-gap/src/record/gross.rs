@@ -1,20 +1,25 @@
-//! Gross errors of the recording and of the rig file, and their comparison with effects.
+//! Gross errors of the recording and of the rig file, in numbers and in words, with what a user should
+//! check.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use stretch_data::{after_number, in_digits};
 
 use crate::{
-    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
-    problem::thresholds::Thresholds,
-    record::suspect::Suspect,
-    search::selection::Found,
+    fit::hypothesis::Hypothesis,
+    problem::{
+        altered::Altered, column::Column, description::Description, fault::Kind,
+        record_facts::nouns, simulator::Simulator, spec::ParameterSpec,
+    },
+    record::units::units,
 };
 
 /// A kind of error of the recording or of the rig file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GrossKind {
     /// A column is scaled by a wrong factor.
+    #[default]
     Scale,
     /// Simulator and recording differ by a factor that no sensor error explains: their units
     /// differ, or parameters of the simulator are wrong but fixed.
@@ -34,7 +39,7 @@ pub enum GrossKind {
 }
 
 /// An error of the recording or of the rig file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Gross {
     /// The kind of error.
     pub what: GrossKind,
@@ -77,48 +82,136 @@ impl Gross {
     pub fn is_plain(&self) -> bool {
         matches!(self.what, GrossKind::Copied | GrossKind::Dead)
     }
+
+    fn of_column(what: GrossKind, column: &Column<'_>, sentence: String) -> Self {
+        let (name, unit) = (column.name.clone(), column.unit.clone().into_owned());
+        let hint = format!("check {}", column.hint);
+        Self { what, column: Some(name.into_owned()), unit, hint, sentence, ..Self::default() }
+    }
+
+    /// Creates the error that `column` is `factor` times `source`, including noise.
+    pub(crate) fn copied(column: &Column<'_>, source: &Column<'_>, factor: f64) -> Self {
+        let (copy, source, times) = (&column.name, &source.name, in_digits(factor, 4));
+        let sentence = format!("{copy} is a copy of {source} ({times} times it, noise and all)");
+        Self {
+            factor: Some(factor),
+            hint: "check which channels the recorder wrote into the two columns".into(),
+            ..Self::of_column(GrossKind::Copied, column, sentence)
+        }
+    }
+
+    /// Creates the error that a column is constant in `count` stretches; the arguments give the
+    /// first of them.
+    pub(crate) fn still(
+        column: &Column<'_>,
+        (trial, from_s, to_s): &(String, f64, f64),
+        count: usize,
+    ) -> Self {
+        let more = match count - 1 {
+            0 => String::new(),
+            more => format!(", and {more} more times"),
+        };
+        let place = format!("{trial}, {from_s:.2} to {to_s:.2} s{more}");
+        let sentence = format!("{} is constant while the others move ({place})", column.name);
+        Self {
+            trial: Some(trial.clone()),
+            from_s: Some(*from_s),
+            to_s: Some(*to_s),
+            ..Self::of_column(GrossKind::Dead, column, sentence)
+        }
+    }
+
+    /// Describes the error of the recording that a hypothesis assumes, with its size; `None` if it
+    /// assumes none.
+    pub(crate) fn found(suspect: &Altered<'_>, hypothesis: &Hypothesis) -> Option<Self> {
+        let (fault, size) = suspect.error_of(&hypothesis.model)?;
+        if let Kind::Parameter(p) = fault.kind {
+            let value = hypothesis.model.parameters[p] * size;
+            return Some(Self::of_parameter(suspect.description(), p, value));
+        }
+        let column = &suspect.columns[fault.column?];
+        let name = &column.name;
+        let found = |what, sentence| Self::of_column(what, column, sentence);
+        Some(match fault.kind {
+            Kind::Scale => {
+                let sd = hypothesis.effect_sd.values().flatten().fold(0.0, |a: f64, b| a.max(*b));
+                let is_output = column.output_of.is_some();
+                let units = units(1.0 / size, sd / size, &column.unit).filter(|_| is_output);
+                let is_exact = suspect.description().parameters.iter().all(|p| p.sd == 0.0);
+                let scaled = if units.is_some() || fault.is_beyond(size) || is_exact && is_output {
+                    Self::of_factor(column, size, units, is_exact)
+                } else if size >= 1.0 {
+                    found(GrossKind::Scale, format!("{name} looks {size:.3} times too large"))
+                } else {
+                    let sentence = format!("{name} looks {size:.3} times as large as it should be");
+                    found(GrossKind::Scale, sentence)
+                };
+                Self { factor: Some(size), ..scaled }
+            }
+            Kind::Offset => {
+                let side = if size > 0.0 { "high" } else { "low" };
+                let (by, unit) = (in_digits(size.abs(), 4), after_number(&column.unit));
+                let sentence = format!("{name} lies {by}{unit} too {side}");
+                Self { offset: Some(size), ..found(GrossKind::Offset, sentence) }
+            }
+            Kind::Delay => {
+                let side = if size > 0.0 { "late" } else { "early" };
+                let sentence = format!("{name} comes {:.3} s {side}", size.abs());
+                let hint = "check the clocks of the recorders, and filters before them".into();
+                Self { delay_s: Some(size), hint, ..found(GrossKind::Delay, sentence) }
+            }
+            _ => {
+                let sentence = format!("{name} is upside down: it falls where it should rise");
+                let hint = format!("check the polarity: {}", column.hint);
+                let (factor, offset) = (Some(-1.0), Some(size));
+                Self { factor, offset, hint, ..found(GrossKind::Sign, sentence) }
+            }
+        })
+    }
+
+    /// Creates the error that simulator and recording of an output differ by a factor, because of
+    /// other units, or because no parameter of the simulator may change (`is_exact`).
+    fn of_factor(column: &Column<'_>, factor: f64, units: Option<String>, is_exact: bool) -> Self {
+        let or = if is_exact { ", or give the parameters tolerances" } else { "" };
+        let that_is = units.as_ref().map_or(String::new(), |units| format!(": that is {units}"));
+        let (name, ratio) = (&column.name, in_digits(1.0 / factor, 4));
+        let sentence = format!("the simulated {name} is {ratio} times the recording's{that_is}");
+        let hint = format!("simulate in the unit of the recording, or convert the recording{or}");
+        Self { units, hint, ..Self::of_column(GrossKind::Factor, column, sentence) }
+    }
+
+    /// Creates the error that a nominal parameter has another value.
+    fn of_parameter(about: &Description, parameter: usize, value: f64) -> Self {
+        let [simulator, rig] = nouns(about.record().gauge_alone);
+        let ParameterSpec { name, unit, nominal, .. } = &about.parameters[parameter];
+        let (found, says, of) = (in_digits(value, 4), in_digits(*nominal, 4), after_number(unit));
+        Self {
+            what: GrossKind::Parameter,
+            parameter: Some(name.clone()),
+            factor: Some(value / nominal),
+            says: Some(*nominal),
+            found: Some(value),
+            unit: unit.clone(),
+            sentence: format!("{name} is {found}{of} on the {rig}, and {says} in the {simulator}"),
+            hint: format!("correct the parameter of the {simulator}, or the setting of the {rig}"),
+            ..Self::default()
+        }
+    }
 }
 
-/// Marks an alternative that replaces the whole set and not one of its effects.
-const WHOLE: usize = usize::MAX;
-/// The share of the gap that an error may leave, divided by that of a set of effects, whose forms
-/// differ from those of the rig.
-const EXACT: f64 = 0.1;
-/// Difference of scores, in nats, within which two errors are tied.
-const TIE: f64 = 1.1;
-
-/// Returns the largest gap that a named set of effects, or an error, may leave.
-pub(crate) fn allowed_gap(problem: &PreparedProblem<'_>, thresholds: &Thresholds) -> f64 {
-    thresholds.unknown_excess + thresholds.unknown_share * problem.gap(&problem.nominal)
-}
-
-/// Compares errors of the recording with the best set of effects. If errors win, returns those that
-/// tie for the best, as they are reported, and the search result with the best error instead of the
-/// effects. Returns `None` if the effects win.
-///
-/// The form of an error is exactly known and has one parameter, so the right error leaves almost
-/// only noise. An error wins if its score is higher than that of the best set of effects and if it
-/// leaves much less of the gap ([`EXACT`]) than a named set may leave.
-pub(crate) fn weigh_errors(
-    doubted: &PreparedProblem<'_>,
-    suspect: &Suspect<'_>,
-    errors: Vec<Hypothesis>,
-    found: &Found,
-    thresholds: &Thresholds,
-) -> Option<(Vec<Gross>, Found)> {
-    let share = EXACT * thresholds.unknown_share;
-    let most = thresholds.unknown_excess + share * doubted.gap(&doubted.nominal);
-    let least = found.best.score.max(thresholds.rise);
-    let above = |e: &Hypothesis| e.score > least && doubted.gap(e) <= most;
-    let mut errors = errors.into_iter().filter(above);
-    let first = errors.next()?;
-    let (tied, behind): (Vec<Hypothesis>, Vec<Hypothesis>) =
-        errors.partition(|e| e.score > first.score - TIE);
-    let told = std::iter::once(&first).chain(&tied).filter_map(|e| Gross::found(suspect, e));
-    let mut gross: Vec<Gross> = told.collect();
-    // If the data cannot distinguish several errors, a factor between two units comes first.
-    gross.sort_by_key(|g| g.units.is_none());
-    let rivals = tied.into_iter().chain(behind).chain([found.best.clone()]);
-    let rivals = rivals.map(|rival| (WHOLE, rival)).collect();
-    Some((gross, Found { best: first, rivals }))
+/// Returns one sentence with the first error, its alternatives, and what a user should check.
+pub(crate) fn sentence(gross: &[Gross], [simulator, rig]: [&str; 2]) -> String {
+    let Some(first) = gross.first() else { return String::new() };
+    let rest: Vec<&str> = gross[1..].iter().map(|g| g.sentence.as_str()).collect();
+    let other = match (rest.is_empty(), first.is_plain()) {
+        (true, _) => String::new(),
+        (false, true) => format!("; {}", rest.join("; ")),
+        (false, false) => format!(" (or {}: these data cannot tell)", rest.join(", or ")),
+    };
+    let wrong = match first.what {
+        GrossKind::Parameter => &format!("A parameter of the {simulator} does not fit the {rig}"),
+        GrossKind::Factor => "Simulation and recording differ by a factor",
+        _ => "The recording is wrong",
+    };
+    format!("{wrong}: {}{other}; {}.", first.sentence, first.hint)
 }

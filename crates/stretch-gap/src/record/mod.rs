@@ -3,16 +3,15 @@
 //!
 //! Input: the columns of a recording, a prepared problem, and the result of the search for effects.
 //! Output: the [`gross::Gross`] errors, if one is more probable than every set of effects, each
-//! with a sentence ([`sentence`], [`units`]). Columns are first checked without any simulation
-//! ([`columns_alone`]). Then every kind of error ([`fault`]) is a hypothesis with one parameter
-//! ([`suspect`]). It is screened ([`screen`]), fitted ([`examine`]) and compared with the effects
-//! ([`gross`]). Imports: `numerics`, `problem`, `fit`, `search`.
+//! with a sentence ([`gross`], [`units`]). Columns are first checked without any simulation
+//! ([`columns_alone`]). Then every [kind of error](crate::problem::fault) is a hypothesis with one
+//! parameter. It is screened ([`screen`]), fitted and compared with the effects ([`mod@examine`]).
+//! Imports: `numerics`, `problem`, `fit`, `search`.
 
 pub(crate) mod columns_alone;
-pub(crate) mod examine;
-pub(crate) mod fault;
+mod examine;
 pub(crate) mod gross;
-pub(crate) mod screen;
-pub(crate) mod sentence;
-pub(crate) mod suspect;
-pub(crate) mod units;
+mod screen;
+mod units;
+
+pub(crate) use examine::examine;

@@ -24,7 +24,7 @@ use crate::{
         score::Misfit,
     },
     problem::{
-        altered_parameters::Altered, error::GapError, sample_roles::Role, simulator::Model,
+        altered::Altered, error::GapError, sample_roles::Role, simulator::Model,
         spec::ParameterSpec,
     },
     search::screen::Ground,

@@ -3,17 +3,16 @@
 //! Input: a prepared problem and the thresholds. Output: [`selection::Found`], the best set of
 //! effects with its alternatives, and every set that was fitted ([`sets`]). Effects are screened
 //! with one simulation per start ([`screen`]); the promising ones are fitted ([`sets`]) and added
-//! if they meet the criteria ([`acceptance`]). Two other explanations are compared: commands that
-//! switch between rows ([`command_timing`]), and other sizes of the nuisances ([`re_estimate`]).
+//! if they meet the criteria ([`acceptance`]). Two other explanations are compared ([`variants`]):
+//! commands that switch between rows, and other sizes of the nuisances.
 //! [`baselines`] are simpler methods. Imports: `numerics`, `problem`, `fit`.
 
 pub(crate) mod acceptance;
 pub(crate) mod baselines;
-pub(crate) mod command_timing;
-pub(crate) mod re_estimate;
 pub(crate) mod screen;
 pub(crate) mod selection;
 pub(crate) mod sets;
+pub(crate) mod variants;
 
 #[cfg(test)]
 mod tests;

@@ -2,7 +2,7 @@
 
 use crate::{
     problem::record_facts::nouns,
-    record::sentence::sentence,
+    record::gross::sentence,
     verdict::{
         answer::{Answer, Closed, MissingEffect},
         diagnosis::Diagnosis,

@@ -1,4 +1,5 @@
-//! Decides whether commands switch at rows of the recording or anywhere between two rows.
+//! Variants of a problem, compared by their likelihoods: commands that switch at rows of the
+//! recording or anywhere between two rows, and other sizes of the nuisances (drift and offsets).
 //!
 //! If every second row of a recording was dropped, a switch appears up to a row late. Under the
 //! hypothesis that commands switch between rows, the
@@ -7,14 +8,19 @@
 //! (such as a late valve), this freedom also improves the fit. Therefore, if this hypothesis is
 //! likelier without effects, effects are searched under both hypotheses, and the larger likelihood
 //! then decides.
+//!
+//! A larger nuisance of a stage may explain the same as an effect of that stage. Therefore two
+//! hypotheses are compared. One is the best set of effects, with nuisances estimated for it. The
+//! other is that set without the effects in stages with nuisances, with nuisances estimated for
+//! this smaller set.
 
 use crate::{
     fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
     problem::{
-        altered_parameters::Altered, error::GapError, simulator::Simulator, spec::ParameterSpec,
+        altered::Altered, error::GapError, simulator::Simulator, spec::ParameterSpec,
         thresholds::Thresholds,
     },
-    search::selection::Search,
+    search::{selection::Search, sets::Sets},
 };
 
 /// Returns the simulator with commands that switch between rows; `None` if the facts about the
@@ -33,7 +39,7 @@ pub(crate) fn between_rows(simulator: &dyn Simulator) -> Option<Altered<'_>> {
 /// there is a gap in a stage that depends on the timing.
 pub(crate) fn likelier<'a>(
     at_rows: PreparedProblem<'a>,
-    between_rows: Option<&'a Altered<'a>>,
+    between_rows: Option<&'a dyn Simulator>,
     (thresholds, depth): (&Thresholds, usize),
     seed: u64,
     progress: &dyn Fn(&str),
@@ -62,4 +68,32 @@ pub(crate) fn likelier<'a>(
     };
     let ((own, from), (other, from_other)) = (best(&at_rows)?, best(&between)?);
     Ok(if other > own { (between, from_other) } else { (at_rows, from) })
+}
+
+/// Returns the problem with the re-estimated nuisances, and the set to continue from; `None` if the
+/// nuisances do not change.
+pub(crate) fn re_estimated<'a>(
+    problem: &PreparedProblem<'a>,
+    sets: &mut Sets<'_>,
+    best: &Hypothesis,
+    seed: u64,
+) -> Result<Option<(PreparedProblem<'a>, Hypothesis)>, GapError> {
+    let mut bare = best.clone();
+    for effect in best.effects.iter().copied().filter(|e| problem.is_in_loose_stage(*e)) {
+        bare = sets.without(&bare, effect)?;
+    }
+    let beside_best = problem.adapted(&best.model, seed)?;
+    let beside_bare = match bare.effects.len() < best.effects.len() {
+        true => problem.adapted(&bare.model, seed)?,
+        false => None,
+    };
+    if let Some(beside_bare) = beside_bare {
+        let own = beside_best.as_ref().unwrap_or(problem);
+        let (levels, others) = (own.levels(best)?, beside_bare.levels(&bare)?);
+        let levels: Vec<f64> = levels.iter().zip(&others).map(|(a, b)| a.min(*b)).collect();
+        if beside_bare.likelihood(&bare, &levels)? > own.likelihood(best, &levels)? {
+            return Ok(Some((beside_bare, bare)));
+        }
+    }
+    Ok(beside_best.map(|problem| (problem, best.clone())))
 }

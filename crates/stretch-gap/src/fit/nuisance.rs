@@ -215,7 +215,7 @@ mod tests {
         DMatrix::from_fn(SAMPLES, SAMPLES, of)
     }
 
-    /// Two drifts, one of which stands still for a while, a separate offset for every ten samples,
+    /// Two drifts, one of which rests for a while, a separate offset for every ten samples,
     /// and an offset: products, determinant and cleaned residual are those of the dense covariance.
     #[test]
     fn overlapping_nuisances_have_the_dense_covariance() {

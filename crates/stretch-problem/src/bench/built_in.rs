@@ -60,8 +60,8 @@ impl<B: BuiltIn + Debug + Send> Diagnosable for B {
     /// A rig file with the findings of a diagnosis: see [`Fix`]. A diagnosis of the same recording with this file gives
     /// `no_gap`.
     ///
-    /// A diagnosis finds the phase of a hum in the recording, second by second, so the file has a phase that stands in
-    /// for it.
+    /// A diagnosis finds the phase of a hum in the recording, second by second, so the file has any phase in
+    /// its place.
     fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let Bench { about, rows, effects, .. } = self.bench();
         let chosen = Chosen::of(diagnosis, evidence)?;

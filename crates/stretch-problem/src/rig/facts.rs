@@ -93,7 +93,7 @@ fn last_open(inlet: &[f64]) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Name of the column that stands for both openings.
+/// Name of the column that replaces both openings.
 const COMMANDS: &str = "inlet, outlet";
 
 /// Range of the delays of the voltage if the catalogue has no skew, s.

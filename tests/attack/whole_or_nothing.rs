@@ -278,7 +278,9 @@ fn a_quota_that_is_reached_is_like_a_full_disk() {
     let scratch = prepared();
     let before = tree(&scratch.path(""));
     // A file size limit acts like a full disk. Its signal is ignored, so that the write fails.
-    for line in ["simulate --protocol paper --out bench --force", "simulate --protocol pulses --out new"] {
+    for line in
+        ["simulate --protocol paper --out bench --force", "simulate --protocol pulses --out new"]
+    {
         let script = format!("trap '' XFSZ; ulimit -f 8; exec \"$0\" {line}");
         let output = Command::new("bash")
             .current_dir(scratch.path(""))

@@ -16,8 +16,8 @@ use crate::problem::{
 /// Factors that are searched, except for outputs.
 const FACTORS: RangeInclusive<f64> = 0.05..=10.0;
 /// Largest factor of an output, and inverse of the smallest. Factors beyond [`FACTORS`] occur if the
-/// simulator uses other units.
-const LARGEST: f64 = 3.163e4;
+/// simulator uses other units. The range is so wide that the prior of its logarithm is flat.
+const LARGEST: f64 = 1e30;
 /// Largest offset that is searched, in spans of the column.
 const SPANS: f64 = 20.0;
 /// Largest delay that is searched, s.

@@ -9,9 +9,9 @@
 //! ```
 //!
 //! m is the measured and y the simulated output; the delay is searched with scale and offset left
-//! free. The error of a parameter is estimated from its re-tuned value, without its tolerance. Then
-//! one simulation per stage shows what remains, after what re-tuning could change is projected out,
-//! for each of two starting points. One is the rig as shipped, because a large error distorts the
+//! free. The error of a parameter is estimated from its re-tuned value, without its tolerance. Then two
+//! simulations per stage show what remains after one step of all parameters within their tolerances,
+//! from each of two starting points. One is the rig as shipped, because a large error distorts the
 //! re-tuned parameters. The other is the re-tuned rig, which is better for a small error.
 
 use rayon::prelude::*;
@@ -108,21 +108,32 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         Ok(Some(Promising { fault, starts, fall: *fall, share }))
     }
 
-    /// Adds an error to a model and simulates what remains. Returns the model with the reduction of
-    /// the sum of squares.
+    /// Adds an error to a model, steps the parameters once, and simulates what remains. Returns the
+    /// model with the reduction of the sum of squares.
     fn tried(&self, ground: &Ground, fault: usize, size: f64) -> Result<(Model, f64), GapError> {
-        let one = &self.suspect.faults[fault];
+        let (one, compare) = (&self.suspect.faults[fault], &self.problem.compare);
+        let own = &ground.model.parameters;
         let size = match one.kind {
             // Converts the factor on the value as shipped to a factor on the value of the model.
-            Kind::Parameter(p) => {
-                size * self.problem.shipped.parameters[p] / ground.model.parameters[p]
-            }
+            Kind::Parameter(p) => size * self.problem.shipped.parameters[p] / own[p],
             _ => size,
         };
-        let model = ground.model.with(self.suspect.index(fault), &[one.clamped(size)]);
+        let mut model = ground.model.with(self.suspect.index(fault), &[one.clamped(size)]);
+        // The sensitivities at a factor of 1 say nothing about a factor beyond that of any sensor.
+        for &stage in one.spec.touches.iter().filter(|_| !one.is_beyond(size)) {
+            let residual = compare.residual(stage, &model)?;
+            let mut step = compare.projected(ground, stage, residual).of_known;
+            ground.solved[stage].0.backward(&mut step);
+            for ((p, _), step) in ground.known[stage].iter().flatten().zip(step) {
+                let spec = &self.problem.simulator().parameters()[*p];
+                let to = (own[*p] - spec.nominal) / spec.sd + step;
+                let to = spec.nominal + spec.sd * to.clamp(-REACH, REACH);
+                model.parameters[*p] = to.max(spec.least);
+            }
+        }
         let mut fall = 0.0;
         for &stage in &one.spec.touches {
-            let residual = self.problem.compare.residual(stage, &model)?;
+            let residual = compare.residual(stage, &model)?;
             fall += self.left[stage] - self.squares(stage, ground, residual);
         }
         Ok((model, fall))

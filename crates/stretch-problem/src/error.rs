@@ -69,7 +69,8 @@ impl ProblemError {
 
     /// Returns the error for a column that stays constant.
     pub(crate) fn dead(column: impl fmt::Display, found: String) -> Self {
-        Self::value(column, found, "the channel is dead: check the sensor and its cable")
+        let hint = "the channel is dead: check the sensor and its cable, or take the column out if it is optional";
+        Self::value(column, found, hint)
     }
 
     /// Returns the error for data that do not suffice.

@@ -1,6 +1,6 @@
 //! The fix of a simulator: a file that contains the findings of a diagnosis.
 
-use std::path::Path;
+use std::{f64::consts::TAU, path::Path};
 
 use stretch_data::{Remarks, RigFile, after_number, in_digits};
 use stretch_effects::EffectParameter;
@@ -227,4 +227,63 @@ fn effect_remark(p: &EffectValue) -> String {
     let [low, high] = p.interval.map(|x| in_digits(x, 4));
     let form = if p.is_form { "form; " } else { "" };
     format!("{form}95 %: {low} .. {high}{}", after_number(&p.unit))
+}
+
+/// Time over which the phase of the mains is assumed constant, s.
+const STEADY_S: f64 = 1.0;
+
+/// Amplitude and phase of a sine that is fitted to pairs of time (s) and value. One sine is fitted to all samples, and
+/// one to each second. If the sine of all samples has at least half of the mean power of the sines of the seconds, its
+/// amplitude and phase are returned. Otherwise the amplitude is the root of that mean power, and the phase is that of
+/// the sine of all samples.
+///
+/// If the sample rate is twice the frequency, one quadrature cannot be observed and counts as zero.
+pub(crate) fn sine(hertz: f64, left: &[(f64, f64)]) -> [f64; 2] {
+    let of = |part: &[(f64, f64)]| -> [f64; 2] {
+        let mut sums = [0.0; 5];
+        for (t, r) in part {
+            let turns = hertz * t;
+            let (sin, cos) = (TAU * (turns - turns.floor())).sin_cos();
+            let products = [cos * cos, cos * sin, sin * sin, r * cos, r * sin];
+            sums.iter_mut().zip(products).for_each(|(sum, x)| *sum += x);
+        }
+        let [cc, cs, ss, rc, rs] = sums;
+        // A quadrature that cannot be observed has no power, which would make the matrix singular:
+        // a millionth of the total power is added.
+        let ridge = 1e-6 * (cc + ss) + f64::MIN_POSITIVE;
+        let (cc, ss) = (cc + ridge, ss + ridge);
+        let determinant = cc * ss - cs * cs;
+        [(rc * ss - rs * cs) / determinant, (rs * cc - rc * cs) / determinant]
+    };
+    let power = |[p, q]: [f64; 2]| p * p + q * q;
+    let whole = of(left);
+    let seconds: Vec<f64> = left
+        .chunk_by(|a, b| (a.0 / STEADY_S).floor() == (b.0 / STEADY_S).floor())
+        .map(|part| power(of(part)))
+        .collect();
+    let mean = seconds.iter().sum::<f64>() / seconds.len().max(1) as f64;
+    let amplitude = if power(whole) >= 0.5 * mean { power(whole) } else { mean }.sqrt();
+    [amplitude, whole[0].atan2(whole[1])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use approx::assert_abs_diff_eq;
+
+    #[test]
+    fn a_sine_is_found_with_a_steady_or_a_drifting_phase() {
+        let wave = |hertz: f64, phase: &dyn Fn(f64) -> f64| -> Vec<(f64, f64)> {
+            let at = |i: u32| 0.01 * f64::from(i);
+            (0..1000).map(at).map(|t| (t, 0.02 * (TAU * hertz * t + phase(t)).sin())).collect()
+        };
+        let [a, phase] = sine(60.0, &wave(60.0, &|_| 1.0));
+        assert_abs_diff_eq!(a, 0.02, epsilon = 1e-6);
+        assert_abs_diff_eq!(phase, 1.0, epsilon = 1e-4);
+        // At a sample rate of twice the frequency, only the sine of the phase can be observed.
+        let [a, phase] = sine(50.0, &wave(50.0, &|_| 0.7));
+        assert_abs_diff_eq!(a * phase.sin(), 0.02 * 0.7_f64.sin(), epsilon = 1e-6);
+        let [a, _] = sine(60.0, &wave(60.0, &|t| 2.0 * t));
+        assert!(a > 0.015, "{a}");
+    }
 }

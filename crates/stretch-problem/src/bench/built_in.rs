@@ -3,12 +3,12 @@
 use std::fmt::Debug;
 
 use stretch_data::{Remarks, RigFile};
-use stretch_gap::{Diagnosis, Evidence, Laboratory, Model};
+use stretch_gap::{Diagnosis, Evidence, Laboratory, Model, Run};
 use stretch_sim::{Effect, EffectSet, Grid, Sketch, Surroundings};
 
 use super::Bench;
 use crate::{
-    fix::{Chosen, Fix, Fixed, NoFix, names},
+    fix::{Chosen, Fix, Fixed, NoFix, names, sine},
     problem::Diagnosable,
 };
 
@@ -19,6 +19,9 @@ pub(crate) trait BuiltIn: Laboratory {
 
     /// The surroundings of an effect in the simulator, re-tuned as in a model.
     fn surroundings<'a>(&self, model: &Model, grid: &'a Grid) -> Surroundings<'a>;
+
+    /// Size of a spectral line of unit amplitude in the sensor's signal.
+    fn line_unit(&self, model: &Model) -> f64;
 
     /// Values of an effect within the limits of a file, because rounding may put a value outside of its range.
     fn within(_: &Effect, values: &[f64]) -> Vec<f64> {
@@ -38,6 +41,29 @@ pub(crate) trait BuiltIn: Laboratory {
     ) -> Result<RigFile, NoFix>;
 }
 
+/// Replaces the amplitude and phase of an effect's spectral line by values from the recording, as a
+/// diagnosis does. They are the amplitude and phase of the residual of the model without the
+/// effect, over the samples outside the test samples. An effect without a line keeps its values.
+fn complete<B: BuiltIn>(own: &B, model: &Model, effect: &Effect, values: Vec<f64>) -> Vec<f64> {
+    let Bench { about, columns, rows, sensor, .. } = own.bench();
+    let Some(line) = effect.line(&values) else { return values };
+    let mut without = model.clone();
+    without.effects.retain(|(index, _)| rows[*index].name != effect.name);
+    let (measured, unit) = (own.measured(*sensor), own.line_unit(model));
+    let mut simulated = vec![0.0; measured.len()];
+    let run = Run::exact(*sensor, &without, about.trials.len());
+    if own.simulate(run, &mut simulated).is_err() {
+        return values;
+    }
+    let mut left = Vec::new();
+    for (trial, range) in about.trials.iter().zip(columns.fitted()) {
+        let at = |i: usize| trial.start_s + (i - range.start) as f64 * about.dt_s;
+        left.extend(range.clone().map(|i| (at(i), (measured[i] - simulated[i]) / unit)));
+    }
+    let [amplitude, phase] = sine(line.hertz, &left);
+    [&[amplitude], values.get(1..).unwrap_or(&[]), &[phase]].concat()
+}
+
 impl<B: BuiltIn + Debug + Send> Diagnosable for B {
     fn notes(&self) -> Vec<String> {
         self.bench().columns.notes.clone()
@@ -54,14 +80,16 @@ impl<B: BuiltIn + Debug + Send> Diagnosable for B {
 
     fn sketch(&self, effect: usize, values: &[f64], model: &Model) -> Option<Sketch> {
         let grid = Grid::samples(self.bench().about.dt_s).ok()?;
-        self.bench().rows[effect].sketch(values, &self.surroundings(model, &grid))
+        let effect = self.bench().rows[effect];
+        let values = complete(self, model, effect, values.to_vec());
+        effect.sketch(&values, &self.surroundings(model, &grid))
     }
 
     /// A rig file with the findings of a diagnosis: see [`Fix`]. A diagnosis of the same recording with this file gives
     /// `no_gap`.
     ///
-    /// A diagnosis finds the phase of a hum in the recording, second by second, so the file has any phase in
-    /// its place.
+    /// A diagnosis does not fit a hum's amplitude and phase, so the file has values that are estimated from the fit
+    /// trials, on the session's clock.
     fn fixed(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Result<Fix, NoFix> {
         let Bench { about, rows, effects, .. } = self.bench();
         let chosen = Chosen::of(diagnosis, evidence)?;
@@ -73,7 +101,7 @@ impl<B: BuiltIn + Debug + Send> Diagnosable for B {
         let mut effects = effects.clone();
         for (index, values) in chosen.effects(&about.effects) {
             let effect = rows[index];
-            let values = Self::within(effect, &effect.with_stand_ins(values));
+            let values = complete(self, chosen.model, effect, Self::within(effect, values));
             chosen.describe(effect.name, self.in_words(index), &mut remarks);
             effects.push(effect, &values)?;
         }

@@ -22,6 +22,10 @@ impl BuiltIn for GaugeSimulator {
         Gauge::surroundings(&self.spec, grid)
     }
 
+    fn line_unit(&self, model: &Model) -> f64 {
+        model.parameters[GAIN]
+    }
+
     fn file(
         &self,
         chosen: &Chosen<'_>,

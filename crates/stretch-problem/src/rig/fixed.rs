@@ -22,6 +22,10 @@ impl BuiltIn for RigSimulator {
         TunedRig::of(&self.base, &self.tuned, model).params.surroundings(grid)
     }
 
+    fn line_unit(&self, _: &Model) -> f64 {
+        1.0
+    }
+
     fn within(effect: &Effect, values: &[f64]) -> Vec<f64> {
         let allowed = effect.parameters.iter().map(EffectParameter::allowed);
         allowed.zip(values).map(|(ends, x)| x.clamp(*ends.start(), *ends.end())).collect()

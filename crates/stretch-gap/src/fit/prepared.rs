@@ -351,20 +351,6 @@ impl<'a> PreparedProblem<'a> {
         -compare.weight() * sum - 0.5 * free * roles.blocks(Role::Fit).ln()
     }
 
-    /// Returns the rise of the log-likelihood from the hypothesis `base` to `next`, nats, computed
-    /// from the [octaves](crate::fit::octaves) of their residuals.
-    pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis) -> f64 {
-        let stages = base.misfits.iter().zip(&next.misfits);
-        stages.map(|(base, next)| base.octaves.rise(&next.octaves)).sum()
-    }
-
-    /// Returns the rise that [`PreparedProblem::rise`] would have in one stage if no more than noise
-    /// were left in this stage.
-    pub(crate) fn most_rise(&self, base: &Hypothesis, stage: usize) -> f64 {
-        let octaves = &base.misfits[stage].octaves;
-        octaves.rise(&octaves.at_most_noise())
-    }
-
     /// Returns the share of the variance of a stage's noise that comes from the noise of its
     /// measured input.
     pub(crate) fn transmits(&self, stage: usize) -> f64 {

@@ -1,8 +1,7 @@
 //! The criteria for adding an effect to a set, with their limits from [`Thresholds`].
 //!
 //! 1. The effect closes at least the share `share` of the gap that is left in its stages.
-//! 2. The score, and the likelihood by [octaves](crate::fit::octaves) of frequency, both rise by
-//!    `rise` nats.
+//! 2. The score rises by `rise` nats.
 //! 3. The effects of the smaller set may leave up to the share `model_discrepancy` of what they
 //!    close, because their forms differ from those of the rig. An effect that closes no more than
 //!    that, or less than `null_excess`, is added only if the score rises by `faint_rise`. If it
@@ -51,7 +50,7 @@ impl Acceptance<'_> {
         let Some(&new) = next.effects.iter().find(|e| !base.effects.contains(e)) else {
             return false;
         };
-        let Thresholds { rise, share, .. } = *self.thresholds;
+        let share = self.thresholds.share;
         let all = 0..base.misfits.len();
         let closed: f64 = all.map(|stage| self.problem.closes(base, next, stage)).sum();
         let is_beyond = self.exceeds_discrepancy(base, next, new);
@@ -59,16 +58,7 @@ impl Acceptance<'_> {
             true => (self.least_rise(closed), share),
             false => (self.thresholds.faint_rise, MOST),
         };
-        next.score - base.score > least
-            && self.problem.rise(base, next) > rise
-            && closed >= of_left * self.left(base, new)
-    }
-
-    /// Whether an effect could meet the criteria, given a set with deviations: whether the
-    /// likelihood by octaves would rise enough if only noise were left in one of its stages.
-    pub(crate) fn is_possible(&self, deviating: &Hypothesis, effect: usize) -> bool {
-        let mut touched = self.touched(effect).iter();
-        touched.any(|&s| self.problem.most_rise(deviating, s) > self.thresholds.rise)
+        next.score - base.score > least && closed >= of_left * self.left(base, new)
     }
 
     /// Returns the rise of the score that a further effect must achieve if it closes this much.

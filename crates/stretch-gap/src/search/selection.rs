@@ -120,9 +120,7 @@ impl<'a> Search<'a> {
         progress: &dyn Fn(&str),
     ) -> Result<Hypothesis, GapError> {
         let from = self.sets.refit(from)?;
-        let begun = from.effects.len();
-        let first = self.grow(from, progress)?;
-        self.second_line(begun, first, progress)
+        self.grow(from, progress)
     }
 
     /// Compares a set with its alternatives. An alternative with a better score replaces an effect
@@ -212,31 +210,6 @@ impl<'a> Search<'a> {
         self.looked_at(&self.problem.nominal.model)
     }
 
-    /// Returns the better of two sets: the set that was found, and the set that grows from the
-    /// runner-up of the first round. A strong effect may take the place of two others, each of
-    /// which alone is worse. Exchanging single effects would not find this pair. Sets with fewer
-    /// than two added effects are returned unchanged.
-    fn second_line(
-        &mut self,
-        begun: usize,
-        best: Hypothesis,
-        progress: &dyn Fn(&str),
-    ) -> Result<Hypothesis, GapError> {
-        if best.effects.len() < begun + 2 || self.problem.is_spent() {
-            return Ok(best);
-        }
-        let first_round = self.sets.tried.values().filter(|s| s.effects.len() == begun + 1);
-        let others =
-            first_round.filter(|s| s.effects.last().is_some_and(|e| !best.effects.contains(e)));
-        let runner_up = others.max_by(|a, b| a.score.total_cmp(&b.score)).cloned();
-        let Some(runner_up) = runner_up.filter(|r| r.score > RIVALRY * best.score) else {
-            return Ok(best);
-        };
-        progress("starting again from another first effect");
-        let other = self.grow(runner_up, progress)?;
-        Ok(if other.score > best.score { other } else { best })
-    }
-
     /// Sorts the effects of a set by the score that is lost if the effect is removed, the largest
     /// loss first.
     fn strongest_first(&mut self, mut set: Hypothesis) -> Result<Hypothesis, GapError> {
@@ -278,7 +251,7 @@ impl<'a> Search<'a> {
         let kept = if best.effects.is_empty() { KEPT } else { KEPT_LATER };
         let deviating = self.acceptance.deviating(best)?;
         let base = (best, &deviating);
-        let list = self.shortlist(base, screened, kept);
+        let list = self.shortlist(best, screened, kept);
         if !list.is_empty() {
             progress(&format!("fitting effects, round {round}: {}", list.len()));
         }
@@ -289,7 +262,7 @@ impl<'a> Search<'a> {
         }
         // A screen assumes linear changes. Before a gap is left unexplained, every effect that
         // could cause it is therefore fitted, whatever its gain in the screen.
-        let others = self.others(&deviating, screened, &list);
+        let others = others(screened, &list);
         progress(&format!("fitting effects that seemed weaker, round {round}: {}", others.len()));
         let least = |effect| self.least_gain(best, effect);
         let others = self.sets.promising(best, ground, others, least)?;
@@ -313,23 +286,6 @@ impl<'a> Search<'a> {
             }
         }
         Ok(None)
-    }
-
-    /// Returns the effects that are not in the shortlist but could close a remaining gap, each with
-    /// its best start.
-    fn others(
-        &self,
-        deviating: &Hypothesis,
-        screened: &[Screened],
-        list: &[Screened],
-    ) -> Vec<Screened> {
-        let is_new = |s: &&Screened| list.iter().all(|l| l.effect != s.effect);
-        let is_possible = |s: &&Screened| self.acceptance.is_possible(deviating, s.effect);
-        let one = |s: &Screened| {
-            let starts = s.starts.iter().take(1).cloned().collect();
-            Screened { starts, ..s.clone() }
-        };
-        screened.iter().filter(is_new).filter(is_possible).map(one).collect()
     }
 
     fn prune(&mut self, mut best: Hypothesis) -> Result<Hypothesis, GapError> {
@@ -371,26 +327,19 @@ impl<'a> Search<'a> {
     }
 
     /// Returns the best effects of a screen, and the twins of the leading ones.
-    fn shortlist(
-        &self,
-        (base, deviating): (&Hypothesis, &Hypothesis),
-        screened: &[Screened],
-        kept: usize,
-    ) -> Vec<Screened> {
-        let is_possible = |s: &&Screened| self.acceptance.is_possible(deviating, s.effect);
-        let screened: Vec<&Screened> = screened.iter().filter(is_possible).collect();
+    fn shortlist(&self, base: &Hypothesis, screened: &[Screened], kept: usize) -> Vec<Screened> {
         let specs = self.problem.simulator().effects();
         let best = screened.first().map_or(0.0, |s| s.gain());
         let least = |effect| self.least_gain(base, effect).max(FAINT * best);
         let promising = screened.iter().take(kept).filter(|s| s.gain() >= least(s.effect));
-        let mut list: Vec<Screened> = promising.copied().cloned().collect();
+        let mut list: Vec<Screened> = promising.cloned().collect();
         let leaders: Vec<usize> = list.iter().take(LEADERS).map(|s| s.effect).collect();
         for leader in leaders {
             for twin in &specs[leader].twins {
                 let one = screened.iter().find(|s| specs[s.effect].name == *twin);
-                let is_new = |o: &&&Screened| list.iter().all(|l| l.effect != o.effect);
+                let is_new = |o: &&Screened| list.iter().all(|l| l.effect != o.effect);
                 if let Some(one) = one.filter(is_new).filter(|o| o.gain() > 0.0) {
-                    list.push((*one).clone());
+                    list.push(one.clone());
                 }
             }
         }
@@ -415,15 +364,11 @@ impl<'a> Search<'a> {
                 break;
             }
             let less = self.sets.without(best, effect)?;
-            let deviating = self.acceptance.deviating(&less)?;
             let looked = self.look(&less)?;
             let Looked { ground, screened: all } = &*looked;
             let own_gain = all.iter().find(|s| s.effect == effect).map_or(0.0, Screened::gain);
-            let screened: Vec<&Screened> = all
-                .iter()
-                .filter(|s| !best.effects.contains(&s.effect))
-                .filter(|s| self.acceptance.is_possible(&deviating, s.effect))
-                .collect();
+            let screened: Vec<&Screened> =
+                all.iter().filter(|s| !best.effects.contains(&s.effect)).collect();
             let catalogue = self.problem.simulator().effects();
             let twins = &catalogue[effect].twins;
             let is_twin = |s: &Screened| twins.contains(&catalogue[s.effect].name);
@@ -443,4 +388,14 @@ impl<'a> Search<'a> {
         }
         Ok(out)
     }
+}
+
+/// Returns the effects that are not in the shortlist, each with its best start.
+fn others(screened: &[Screened], list: &[Screened]) -> Vec<Screened> {
+    let is_new = |s: &&Screened| list.iter().all(|l| l.effect != s.effect);
+    let one = |s: &Screened| {
+        let starts = s.starts.iter().take(1).cloned().collect();
+        Screened { starts, ..s.clone() }
+    };
+    screened.iter().filter(is_new).map(one).collect()
 }

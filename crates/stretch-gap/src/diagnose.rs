@@ -245,7 +245,7 @@ fn search<'a>(
 ) -> Result<Searched<'a>, GapError> {
     let Task { options, progress, .. } = task;
     let problem = problem.with_reserve(false);
-    let mut search = Search::new(&problem, &options.thresholds, task.depth()).quick();
+    let mut search = Search::new(&problem, &options.thresholds, task.depth());
     let best = search.best(from, progress)?;
     let least_gap = options.thresholds.least_gap;
     let other = if_possible(problem.retuned_from(&best, least_gap, options.seed))?.flatten();
@@ -278,10 +278,7 @@ fn search<'a>(
     };
     let ((found, eliminated, tried, looked), problem) = match again {
         Some(again) => again,
-        None => {
-            let best = search.thoroughly(best, progress)?;
-            (rivalled(search, best)?, problem)
-        }
+        None => (rivalled(search, best)?, problem),
     };
     let problem = problem.with_reserve(true);
     Ok(Searched { problem, found, eliminated, tried, looked, is_lost: false })

@@ -26,8 +26,6 @@
 //! what the fixed nominal parameters could have explained (Brynjarsdottir and O'Hagan 2014, doi
 //! 10.1088/0266-5611/30/11/114007).
 
-use std::borrow::Borrow;
-
 use nalgebra::{DMatrix, DVector};
 use rayon::iter::ParallelIterator;
 
@@ -65,8 +63,6 @@ pub(crate) struct Fitted {
     /// Whether the fit stopped with sensitivities that were all simulated at its last point. A
     /// further fit from this point would end at once.
     pub(crate) is_settled: bool,
-    /// Fall of the cost in the last iteration, nats.
-    pub(crate) last_fall: f64,
 }
 
 /// Limits of the work that a fit may do.
@@ -115,12 +111,7 @@ impl Comparison<'_> {
     pub(crate) fn cost(&self, stages: &[usize], model: &Model, residuals: &[Vec<f64>]) -> f64 {
         let column = |(&s, r): (&usize, &Vec<f64>)| self.metrics[s].column(&self.roles, r.clone());
         let columns: Vec<Column> = stages.iter().zip(residuals).map(column).collect();
-        self.cost_of(stages, model, &columns.iter().collect::<Vec<_>>())
-    }
-
-    /// The same as [`Comparison::cost`], from residuals that are prepared for products.
-    pub(crate) fn cost_of(&self, stages: &[usize], model: &Model, residuals: &[&Column]) -> f64 {
-        cost(self, (stages, &coordinates(self.simulator(), stages, model)), model, residuals)
+        cost(self, (stages, &coordinates(self.simulator(), stages, model)), model, &columns)
     }
 
     /// Fits from a starting model. `known` holds, by stage, sensitivities to the nominal parameters
@@ -146,8 +137,7 @@ impl Comparison<'_> {
             }
             let before = descent.cost;
             let has_moved = descent.step()?;
-            descent.last_fall = before - descent.cost;
-            let is_still = descent.last_fall < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
+            let is_still = before - descent.cost < LEAST_GAIN.0 + LEAST_GAIN.1 * descent.cost;
             descent.is_settled = is_still && renew && self.simulator().model_runs().is_none();
             // If there is no progress with old sensitivities, renew them before giving up.
             if is_still && (renew || (!has_moved && descent.lambda > 1e3)) {
@@ -210,10 +200,10 @@ fn cost(
     compare: &Comparison<'_>,
     (stages, coordinates): (&[usize], &[(Coordinate, [f64; 2])]),
     model: &Model,
-    residuals: &[impl Borrow<Column>],
+    residuals: &[Column],
 ) -> f64 {
     let squares = |(&s, r): (&usize, &Column)| compare.product(s, r, r);
-    let data: f64 = stages.iter().zip(residuals.iter().map(Borrow::borrow)).map(squares).sum();
+    let data: f64 = stages.iter().zip(residuals).map(squares).sum();
     let prior: f64 = coordinates.iter().map(|(c, _)| c.prior(c.read(model)).cost).sum();
     0.5 * compare.weight() * data + prior
 }
@@ -243,9 +233,8 @@ struct Descent<'a, 'b> {
     normal: DMatrix<f64>,
     gradient: Vec<f64>,
     lambda: f64,
-    /// As the fields of [`Fitted`] with the same names.
+    /// As the field of [`Fitted`] with the same name.
     is_settled: bool,
-    last_fall: f64,
 }
 
 impl<'a, 'b> Descent<'a, 'b> {
@@ -273,7 +262,6 @@ impl<'a, 'b> Descent<'a, 'b> {
             gradient: vec![0.0; n],
             lambda: 1e-3,
             is_settled: false,
-            last_fall: 0.0,
             coordinates,
             model,
             near,
@@ -434,18 +422,8 @@ impl<'a, 'b> Descent<'a, 'b> {
                 }
             }
         }
-        let Self { model, cost, coordinates, normal, is_settled, last_fall, .. } = self;
-        Fitted {
-            model,
-            cost,
-            misfits,
-            effect_sd,
-            parameter_sd,
-            coordinates,
-            normal,
-            is_settled,
-            last_fall,
-        }
+        let Self { model, cost, coordinates, normal, is_settled, .. } = self;
+        Fitted { model, cost, misfits, effect_sd, parameter_sd, coordinates, normal, is_settled }
     }
 }
 

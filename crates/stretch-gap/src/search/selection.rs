@@ -53,9 +53,6 @@ pub(crate) struct Search<'a> {
     pub(crate) sets: Sets<'a>,
     /// Largest number of effects in a set.
     depth: usize,
-    /// Whether candidates with little promise in the screen are also fitted before a gap is left
-    /// unexplained.
-    is_thorough: bool,
     /// Cached screens, the newest first. If the best set has a single effect, its alternatives come
     /// from the screen that found it.
     looked: Vec<Arc<Looked>>,
@@ -83,13 +80,7 @@ impl<'a> Search<'a> {
         depth: usize,
     ) -> Self {
         let (acceptance, sets) = (Acceptance { problem, thresholds }, Sets::new(problem));
-        Self { problem, acceptance, sets, depth, is_thorough: true, looked: Vec::new() }
-    }
-
-    /// Returns a search that fits only effects that the screen finds promising. This is sufficient
-    /// to estimate the nuisances.
-    pub(crate) fn quick(self) -> Self {
-        Self { is_thorough: false, ..self }
+        Self { problem, acceptance, sets, depth, looked: Vec::new() }
     }
 
     /// Returns the same search for the same problem with other nuisances. Fits start from the
@@ -100,16 +91,6 @@ impl<'a> Search<'a> {
     {
         let sets = Sets::after(problem, &self.sets);
         Search { sets, ..Search::new(problem, self.acceptance.thresholds, self.depth) }
-    }
-
-    /// Extends the set that a quick search found by a thorough search.
-    pub(crate) fn thoroughly(
-        &mut self,
-        from: Hypothesis,
-        progress: &dyn Fn(&str),
-    ) -> Result<Hypothesis, GapError> {
-        self.is_thorough = true;
-        self.grow(from, progress)
     }
 
     /// Finds the best set by extending `from`, a set that was fitted in this or in another problem.
@@ -250,23 +231,11 @@ impl<'a> Search<'a> {
         let Looked { ground, screened } = &*looked;
         let kept = if best.effects.is_empty() { KEPT } else { KEPT_LATER };
         let deviating = self.acceptance.deviating(best)?;
-        let base = (best, &deviating);
         let list = self.shortlist(best, screened, kept);
         if !list.is_empty() {
             progress(&format!("fitting effects, round {round}: {}", list.len()));
         }
-        let next = self.first_accepted(base, ground, &list)?;
-        let is_open = self.problem.gap(best) > self.acceptance.thresholds.null_excess;
-        if next.is_some() || !is_open || !self.is_thorough || self.problem.is_spent() {
-            return Ok(next);
-        }
-        // A screen assumes linear changes. Before a gap is left unexplained, every effect that
-        // could cause it is therefore fitted, whatever its gain in the screen.
-        let others = others(screened, &list);
-        progress(&format!("fitting effects that seemed weaker, round {round}: {}", others.len()));
-        let least = |effect| self.least_gain(best, effect);
-        let others = self.sets.promising(best, ground, others, least)?;
-        self.first_accepted(base, ground, &others)
+        self.first_accepted((best, &deviating), ground, &list)
     }
 
     /// Returns the extension of `base` with the highest score that meets the acceptance criteria.
@@ -388,14 +357,4 @@ impl<'a> Search<'a> {
         }
         Ok(out)
     }
-}
-
-/// Returns the effects that are not in the shortlist, each with its best start.
-fn others(screened: &[Screened], list: &[Screened]) -> Vec<Screened> {
-    let is_new = |s: &&Screened| list.iter().all(|l| l.effect != s.effect);
-    let one = |s: &Screened| {
-        let starts = s.starts.iter().take(1).cloned().collect();
-        Screened { starts, ..s.clone() }
-    };
-    screened.iter().filter(is_new).map(one).collect()
 }

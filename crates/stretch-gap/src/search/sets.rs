@@ -18,7 +18,6 @@ use crate::{
         comparison::Sensitivities,
         hypothesis::Hypothesis,
         levenberg_marquardt::{COARSE, Effort, FINE, Fitted, GLANCE, possible},
-        metric::Column,
         prepared::PreparedProblem,
     },
     problem::{
@@ -452,27 +451,6 @@ impl<'a> Sets<'a> {
     fn take_out(&self, asked: &[usize], is_fitted: impl Fn(usize) -> bool) {
         let lost: Vec<usize> = asked.iter().copied().filter(|effect| !is_fitted(*effect)).collect();
         self.problem.compare.runs.not_fitted(&lost);
-    }
-
-    /// Selects the effects for which a very short fit lowers the cost by at least `least`, in total
-    /// or in its last step. The gains of the screen are ignored.
-    pub(crate) fn promising(
-        &self,
-        base: &Hypothesis,
-        ground: &Ground,
-        screened: Vec<Screened>,
-        least: impl Fn(usize) -> f64,
-    ) -> Result<Vec<Screened>, GapError> {
-        let starts = self.starts(base, &screened.iter().collect::<Vec<_>>())?;
-        let glanced = self.glanced(base, ground, starts)?;
-        let falls = |s: &Screened| {
-            let (stages, model) = self.part(base, s.effect, base.model.clone());
-            let residuals: Vec<&Column> = stages.iter().map(|&s| &ground.residuals[s]).collect();
-            let before = self.problem.compare.cost_of(&stages, &model, &residuals);
-            let fall = |fitted: &Fitted| fitted.last_fall.max(before - fitted.cost);
-            glanced.get(&s.effect).is_some_and(|fitted| fall(fitted) >= least(s.effect))
-        };
-        Ok(screened.into_iter().filter(|s| falls(s)).collect())
     }
 
     /// Fits to convergence the effects that may still win; `None` for an effect whose fit cannot be

@@ -41,7 +41,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    fit::{hypothesis::Hypothesis, prepared::PreparedProblem},
+    fit::{hypothesis::Hypothesis, octaves::Octaves, prepared::PreparedProblem},
     problem::{error::GapError, sample_roles::Role, spec::EffectSpec, thresholds::Thresholds},
     search::{
         acceptance::Acceptance,
@@ -133,6 +133,7 @@ struct Change {
     projected: Projected,
     /// <d,d>.
     square: f64,
+    octaves: Octaves,
     /// x of the module documentation.
     level: f64,
     /// The product m x of the module documentation.
@@ -321,12 +322,13 @@ impl Prober<'_> {
     fn change(&self, stage: usize, there: &[f64]) -> Change {
         let compare = &self.inputs.problem.compare;
         let projected = compare.projected_change(self.ground, stage, there);
+        let octaves = compare.octaves(stage, &projected.column.values);
         let noise = &self.noise[stage];
         let both: Vec<f64> =
             projected.column.values.iter().zip(noise).map(|(d, r)| d + r).collect();
         let level = compare.mean_square(&self.inputs.best.misfits[stage]).max(f64::MIN_POSITIVE);
         let square = compare.inner(stage, &projected, &projected);
-        Change { stage, square, projected, level, weight: compare.memory(&both) * level }
+        Change { stage, square, projected, octaves, level, weight: compare.memory(&both) * level }
     }
 
     /// Whether an effect is seen at an amplitude of its probe.
@@ -340,14 +342,18 @@ impl Prober<'_> {
         let square = certain * certain;
         let count = |role| compare.roles.count(role) as f64;
         let all = count(Role::Fit) + count(Role::Held);
-        let (mut closed, mut score) = (0.0, -probe.price);
+        let (mut closed, mut score, mut rise) = (0.0, -probe.price, 0.0);
         for change in &probe.changes {
+            let misfit = &self.inputs.best.misfits[change.stage];
             let gap = square * change.square / count(Role::Fit);
             closed += gap;
             score += 0.5 * all * change.level / change.weight * (gap / change.level).ln_1p();
+            rise += misfit.octaves.plus(&change.octaves.scaled(square)).rise(&misfit.octaves);
         }
         let acceptance = Acceptance { problem, thresholds };
-        score > acceptance.least_rise(closed) && closed > thresholds.least_gap
+        score > acceptance.least_rise(closed)
+            && rise > thresholds.rise
+            && closed > thresholds.least_gap
     }
 
     /// Returns the limits of an effect.

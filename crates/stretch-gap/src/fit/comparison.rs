@@ -12,6 +12,7 @@ use crate::{
         metric::{Column, Metric},
         motion::depends_on_motion,
         noise_level::noise_levels,
+        octaves::Octaves,
         score::{Misfit, samples_per_observation},
     },
     numerics::linear::dot,
@@ -178,11 +179,12 @@ impl<'a> Comparison<'a> {
             let sum = self.metrics[stage].product(&self.roles, residual, residual, role);
             if n > 0.0 { sum / n } else { 1.0 }
         };
+        let octaves = self.octaves(stage, &residual.values);
         let read = self.is_read(stage).then(|| {
             let left = self.errors(stage, &residual.values);
             Read { unread: Arc::clone(&left), left }
         });
-        Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held), read }
+        Misfit { stage, fit: mean(Role::Fit), held: mean(Role::Held), octaves, read }
     }
 
     /// Whether an effect of the catalogue reads the measured output of this stage, or reads another
@@ -232,6 +234,17 @@ impl<'a> Comparison<'a> {
         clean
     }
 
+    /// Returns the mean squares by [octaves](crate::fit::octaves) of a residual in multiples of the
+    /// noise, over fitted and held-out samples.
+    pub(crate) fn octaves(&self, stage: usize, residual: &[f64]) -> Octaves {
+        let clean = self.clean(stage, residual);
+        let mut octaves = Octaves::default();
+        for s in self.roles.looked_at() {
+            octaves.add(&residual[s.from..s.to], &clean[s.from..s.to]);
+        }
+        octaves
+    }
+
     /// Computes the transmitted noise of a stage: the mean square that the measured input's noise
     /// causes at the output, in variances of the noise.
     pub(crate) fn transmitted(&self, stage: usize, model: &Model) -> Result<Misfit, GapError> {
@@ -247,10 +260,14 @@ impl<'a> Comparison<'a> {
             };
             mean.fit += power(Role::Fit) / DRAWS as f64;
             mean.held += power(Role::Held) / DRAWS as f64;
+            for s in self.roles.looked_at() {
+                mean.octaves.add(&arrived[s.from..s.to], &arrived[s.from..s.to]);
+            }
             if mean.fit == 0.0 {
                 break;
             }
         }
+        mean.octaves = mean.octaves.scaled(1.0 / DRAWS as f64);
         Ok(mean)
     }
 

@@ -7,8 +7,8 @@
 //! slow drift and offsets marginalised ([`metric`], [`nuisance`], [`hyper_parameters`]); a test of
 //! whether a residual depends on the [`motion`], in which case no drift of the recorder is assumed;
 //! residuals and sensitivities of the stages ([`comparison`]); bounded Levenberg-Marquardt fits in
-//! scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced chi-square and scores ([`score`]);
-//! errors that several outputs have in common ([`alike`]); deviations of the forms of
+//! scaled [`coordinate`]s ([`levenberg_marquardt`]); reduced chi-square and scores ([`score`],
+//! [`octaves`]); errors that several outputs have in common ([`alike`]); deviations of the forms of
 //! effects ([`deviations`]); which parameters the data determine ([`identifiability`]);
 //! re-tuning from several starts ([`starts`]); a fit of selected samples after a diagnosis
 //! ([`sample_fit`]). Uses the modules `numerics` and `problem`.
@@ -26,6 +26,7 @@ pub(crate) mod metric;
 pub(crate) mod motion;
 pub(crate) mod noise_level;
 pub(crate) mod nuisance;
+pub(crate) mod octaves;
 pub(crate) mod prepared;
 pub(crate) mod sample_fit;
 pub(crate) mod score;

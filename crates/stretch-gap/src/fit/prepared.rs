@@ -351,6 +351,13 @@ impl<'a> PreparedProblem<'a> {
         -compare.weight() * sum - 0.5 * free * roles.blocks(Role::Fit).ln()
     }
 
+    /// Returns the rise of the log-likelihood from the hypothesis `base` to `next`, nats, computed
+    /// from the [octaves](crate::fit::octaves) of their residuals.
+    pub(crate) fn rise(&self, base: &Hypothesis, next: &Hypothesis) -> f64 {
+        let stages = base.misfits.iter().zip(&next.misfits);
+        stages.map(|(base, next)| base.octaves.rise(&next.octaves)).sum()
+    }
+
     /// Returns the share of the variance of a stage's noise that comes from the noise of its
     /// measured input.
     pub(crate) fn transmits(&self, stage: usize) -> f64 {

@@ -30,7 +30,10 @@
 //! own N and X, and need no penalty.
 
 use crate::{
-    fit::alike::{Read, taken},
+    fit::{
+        alike::{Read, taken},
+        octaves::Octaves,
+    },
     numerics::linear::dot,
 };
 
@@ -41,6 +44,8 @@ pub(crate) struct Misfit {
     pub(crate) stage: usize,
     pub(crate) fit: f64,
     pub(crate) held: f64,
+    /// Mean squares of fitted and held-out samples together, by octaves.
+    pub(crate) octaves: Octaves,
     /// The residual, if an effect of the catalogue reads this output or this output reads others:
     /// see [`crate::fit::alike`].
     pub(crate) read: Option<Read>,
@@ -86,6 +91,7 @@ impl Misfit {
         Self {
             fit: moved(self.fit, from.fit, to.fit),
             held: moved(self.held, from.held, to.held),
+            octaves: self.octaves.moved(&from.octaves, &to.octaves),
             read: self.read.clone(),
             stage: self.stage,
         }
@@ -113,6 +119,7 @@ impl Misfit {
         Self {
             fit: level(self.fit, nominal.fit, own.fit),
             held: level(self.held, nominal.held, own.held),
+            octaves: self.octaves.at_equal_noise(&nominal.octaves, &own.octaves, larger),
             read: self.read.clone(),
             stage: self.stage,
         }

@@ -1,7 +1,8 @@
 //! The criteria for adding an effect to a set, with their limits from [`Thresholds`].
 //!
 //! 1. The effect closes at least the share `share` of the gap that is left in its stages.
-//! 2. The score rises by `rise` nats.
+//! 2. The score, and the likelihood by [octaves](crate::fit::octaves) of frequency, both rise by
+//!    `rise` nats.
 //! 3. The effects of the smaller set may leave up to the share `model_discrepancy` of what they
 //!    close, because their forms differ from those of the rig. An effect that closes no more than
 //!    that, or less than `null_excess`, is added only if the score rises by `faint_rise`. If it
@@ -50,7 +51,7 @@ impl Acceptance<'_> {
         let Some(&new) = next.effects.iter().find(|e| !base.effects.contains(e)) else {
             return false;
         };
-        let share = self.thresholds.share;
+        let Thresholds { rise, share, .. } = *self.thresholds;
         let all = 0..base.misfits.len();
         let closed: f64 = all.map(|stage| self.problem.closes(base, next, stage)).sum();
         let is_beyond = self.exceeds_discrepancy(base, next, new);
@@ -58,7 +59,9 @@ impl Acceptance<'_> {
             true => (self.least_rise(closed), share),
             false => (self.thresholds.faint_rise, MOST),
         };
-        next.score - base.score > least && closed >= of_left * self.left(base, new)
+        next.score - base.score > least
+            && self.problem.rise(base, next) > rise
+            && closed >= of_left * self.left(base, new)
     }
 
     /// Returns the rise of the score that a further effect must achieve if it closes this much.

@@ -31,7 +31,7 @@ fn pure_noise_is_no_effect() {
 }
 
 /// The same test with noise of which half of the variance is correlated over 0.05 s. The stated
-/// noise includes this part.
+/// noise includes this part, because the likelihood by octaves does not model correlated noise.
 #[test]
 fn coloured_noise_is_no_effect() {
     for seed in 0..20 {

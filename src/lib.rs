@@ -45,8 +45,8 @@ struct Cli {
     quiet: bool,
     /// Also print what is read and chosen
     ///
-    /// With times, on standard error. For a diagnosis, print all details and the answers of simpler methods.
-    #[arg(short, long, alias = "baselines", global = true, display_order = 901)]
+    /// With times, on standard error. For a diagnosis, print all details.
+    #[arg(short, long, global = true, display_order = 901)]
     verbose: bool,
     #[command(subcommand)]
     command: Command,

@@ -5,13 +5,10 @@ use plotters::{
     prelude::*,
     style::text_anchor::{HPos, VPos},
 };
-use stretch_blind::{Baseline, Calibration, CaseKind, Miss, Rate, Score};
-use stretch_report::{
-    kit::{
-        Axes, Bar, Figure, FigureSize, Ink, Page, Row, Scale, Table, bar_figure, dot, number,
-        percent, plot, px, stroke, words,
-    },
-    method_in_words,
+use stretch_blind::{Calibration, CaseKind, Miss, Rate, Score};
+use stretch_report::kit::{
+    Axes, Bar, Figure, FigureSize, Ink, Page, Row, Scale, Table, bar_figure, dot, number, percent,
+    plot, px, stroke, words,
 };
 
 use crate::{goals::Goal, score::Answers};
@@ -24,7 +21,6 @@ const STRENGTHS: [f64; 8] = [0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 pub(crate) fn page(score: &Score, answers: &Answers, reached: &[Goal]) -> String {
     let mut page = Page::new("Blind check of the diagnosis", &sentence(score));
     goals(&mut page, &answers.sha256, reached);
-    methods(&mut page, score);
     strength(&mut page, score, answers);
     probabilities(&mut page, score);
     misses(&mut page, score);
@@ -62,34 +58,6 @@ fn goals(page: &mut Page, sha256: &str, reached: &[Goal]) {
         &["Figure", "Goal", "Reached", "Count", "95 % interval", "Met"],
         reached.iter().map(|goal| goal.cells().to_vec()),
     ));
-}
-
-/// What simpler methods would have said of the same cases.
-fn methods(page: &mut Page, score: &Score) {
-    if score.baselines.is_empty() {
-        return;
-    }
-    page.section(
-        "What simpler methods would have said",
-        "Each leaves one step out: the largest drop of the error does not re-tune the simulator, the signature fits \
-         nothing, BIC counts every sample as independent and asks for no confirmation on other trials.",
-    );
-    let ours = Baseline {
-        top1: score.singles.top1,
-        top1_above_10: score.singles.top1_above_10,
-        false_names: score.false_names,
-    };
-    let theirs = score.baselines.iter().map(|(name, b)| (method_in_words(name), b));
-    let all = std::iter::once(("this diagnosis", &ours)).chain(theirs);
-    let cell = |rate: &Rate| match rate.share() {
-        Some(share) => format!("{} ({} of {})", percent(share), rate.hits, rate.cases),
-        None => "no case".to_owned(),
-    };
-    let rows = all.map(|(name, b)| {
-        vec![name.to_owned(), cell(&b.top1), cell(&b.top1_above_10), cell(&b.false_names)]
-    });
-    let head = ["Method", "First name right", "Above an excess of 10", "Names something on nulls"];
-    page.table(&Table::new("The same cases, by method", &head, rows).highlight(0));
 }
 
 fn rate_row(label: &str, rate: &Rate) -> Row {

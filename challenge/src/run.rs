@@ -38,11 +38,8 @@ pub struct RunOptions {
     /// Answer again where there is an answer
     #[arg(long)]
     pub again: bool,
-    /// Leave out the simpler methods that are run for comparison
-    #[arg(long)]
-    pub no_baselines: bool,
     /// Program that is asked in place of this one, as `PROGRAM diagnose . --json=diagnosis.json --no-next`,
-    /// with --without EFFECT and --baselines behind it; `stretch` is one
+    /// with --without EFFECT behind it; `stretch` is one
     #[arg(long, value_name = "PROGRAM")]
     pub program: Option<PathBuf>,
 }
@@ -88,7 +85,7 @@ pub fn run_cases(folder: &Path, options: &RunOptions) -> anyhow::Result<(usize, 
     shared_out(jobs, waiting.len(), |at| {
         let (name, path) = waiting[at];
         ensure!(!is_stopped(), "interrupted");
-        answer(&program, path, jobs == 1, options).with_context(|| name.clone())?;
+        answer(&program, path, jobs == 1).with_context(|| name.clone())?;
         progress.inc(1);
         Ok(())
     })?;
@@ -97,7 +94,7 @@ pub fn run_cases(folder: &Path, options: &RunOptions) -> anyhow::Result<(usize, 
 }
 
 /// Diagnoses one case in a process that is given a copy of its data and nothing else.
-fn answer(program: &Path, case: &Path, is_alone: bool, options: &RunOptions) -> anyhow::Result<()> {
+fn answer(program: &Path, case: &Path, is_alone: bool) -> anyhow::Result<()> {
     let room = Room::of(case)?;
     let mut command = room.command(program);
     command.args(["diagnose", ".", &format!("--json={ANSWER}"), "--no-next"]);
@@ -106,9 +103,6 @@ fn answer(program: &Path, case: &Path, is_alone: bool, options: &RunOptions) -> 
     }
     if !is_alone {
         command.env("RAYON_NUM_THREADS", "1");
-    }
-    if !options.no_baselines {
-        command.arg("--baselines");
     }
     let output =
         command.output().with_context(|| format!("{}: it cannot be run", program.display()))?;
@@ -244,9 +238,6 @@ pub struct Asked {
     /// Effects that the catalogue must do without
     #[arg(long)]
     without: Vec<String>,
-    /// Whether simpler methods are asked, too
-    #[arg(long)]
-    baselines: bool,
     /// No further experiment is ever looked for; `stretch diagnose` asks for that with this
     #[arg(long)]
     no_next: bool,
@@ -259,8 +250,7 @@ pub struct Asked {
 pub fn write_diagnosis(asked: &Asked) -> anyhow::Result<()> {
     let reading = Reading { without: &asked.without, ..Reading::default() };
     let problem = Problem::read(&asked.folder, &reading)?;
-    let options = Options { baselines: asked.baselines, ..Options::default() };
-    let examined = problem.examine(&options, false, &|_| (), &|| false)?;
+    let examined = problem.examine(&Options::default(), false, &|_| (), &|| false)?;
     let text = serde_json::to_string_pretty(&examined.to_json())? + "\n";
     Ok(write_whole(&asked.json, |out| out.write_all(text.as_bytes()))?)
 }

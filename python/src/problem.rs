@@ -39,7 +39,6 @@ pub(crate) struct How {
     depth: NonZeroUsize,
     seed: u64,
     threads: usize,
-    baselines: bool,
     budget: Option<usize>,
     batch: usize,
     answers_all: bool,
@@ -304,7 +303,6 @@ impl Work<Answer> {
             depth: how.depth,
             threads: how.threads,
             seed: how.seed,
-            baselines: how.baselines,
             responses: true,
             ..Options::default()
         };

@@ -191,8 +191,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         let is_empty = std::fs::read_dir(folder).is_ok_and(|mut held| held.next().is_none());
         ensure!(is_empty, FileError::Exists { path: folder.display().to_string() });
     }
-    let options =
-        Options { baselines: is_verbose(), responses: args.report.is_some(), ..Options::default() };
+    let options = Options { responses: args.report.is_some(), ..Options::default() };
     let bar = spinner();
     bar.set_message("reading, and starting your own simulator if there is one");
     let shown = || args.data_set.display().to_string();

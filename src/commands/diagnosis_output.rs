@@ -10,8 +10,8 @@ use stretch_data::{
 use stretch_gap::{Diagnosis, Knowledge, ParameterShift, SliceGap, VerdictKind, Where};
 use stretch_problem::{ByTrial, Examined, Fixed, Implementation, effect_in_words, notation};
 use stretch_report::{
-    Table, baseline_table, candidate_numbers_table, candidate_table, difference_table, run_table,
-    stage_table, times, transfer_in_words, transfer_table,
+    Table, candidate_numbers_table, candidate_table, difference_table, run_table, stage_table,
+    times, transfer_in_words, transfer_table,
 };
 use stretch_sim::Language;
 
@@ -59,7 +59,6 @@ pub(crate) fn text(
     identifiability(&mut out, diagnosis, is_verbose);
     implement(&mut out, implementations, diagnosis);
     transfer(&mut out, diagnosis);
-    diagnosis.baselines.iter().for_each(|said| put_table(&mut out, &baseline_table(said)));
     next(&mut out, diagnosis);
     if let Some(runs) = diagnosis.model_runs {
         out.push(format!(

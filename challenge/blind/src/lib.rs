@@ -58,7 +58,7 @@ pub use plants::{
     Form, FormFamily, Level, OpenLabel, OpenTruth, PlantName, make_set, sealed_beside,
 };
 pub use rate::{Bin, Calibration, Rate};
-pub use score::{Baseline, COUNTED_EXCESS, Compounds, Miss, Score, Singles};
+pub use score::{COUNTED_EXCESS, Compounds, Miss, Score, Singles};
 pub use submission::{Answer, Believed, Figures, Interval, OpenScore, Outcome, Said, Submission};
 pub use truth::{Acting, CaseKind, Label, TWINS, Truth, are_twins};
 pub use verdict::Verdict;

@@ -41,33 +41,6 @@ pub struct Compounds {
     pub one_named: Rate,
 }
 
-/// A simpler method on the same cases.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Baseline {
-    /// Its name right, singles with at least [`COUNTED_EXCESS`].
-    pub top1: Rate,
-    /// The same for an excess above 10.
-    pub top1_above_10: Rate,
-    /// Nulls on which it named an effect.
-    pub false_names: Rate,
-}
-
-impl Baseline {
-    fn add(&mut self, label: &Label, named: Option<&String>) {
-        match label.kind {
-            CaseKind::Null => self.false_names.add(named.is_some()),
-            CaseKind::Single if label.excess >= COUNTED_EXCESS => {
-                let right = named.is_some() && named == label.effects.first();
-                self.top1.add(right);
-                if label.excess > 10.0 {
-                    self.top1_above_10.add(right);
-                }
-            }
-            _ => {}
-        }
-    }
-}
-
 /// A case answered wrongly.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Miss {
@@ -119,8 +92,6 @@ pub struct Score {
     pub by_effect: BTreeMap<String, Rate>,
     /// Exactly the one effect named, by family of its form, singles counted.
     pub by_family: BTreeMap<Family, Rate>,
-    /// Simpler methods, by name.
-    pub baselines: BTreeMap<String, Baseline>,
     /// Every wrong answer.
     pub misses: Vec<Miss>,
     /// Median, 95th percentile and greatest time of a diagnosis, s.
@@ -165,10 +136,6 @@ impl Tally {
     fn add(&mut self, label: &Label, verdict: &Verdict) {
         self.score.cases += 1;
         self.times.push(verdict.runtime_s);
-        for (method, named) in &verdict.baselines {
-            let one = self.score.baselines.entry(method.clone()).or_default();
-            one.add(label, named.as_ref());
-        }
         let right = match label.kind {
             CaseKind::Single => self.single(label, verdict),
             CaseKind::Null => self.null(verdict),

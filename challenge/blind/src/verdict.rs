@@ -1,7 +1,5 @@
 //! The scored part of a diagnosis of a case.
 
-use std::collections::BTreeMap;
-
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
@@ -34,9 +32,6 @@ pub struct Verdict {
     pub stage: Option<String>,
     /// Seconds the diagnosis took.
     pub runtime_s: f64,
-    /// Names given by simpler methods that also ran, by method; `None` if a method named nothing.
-    #[serde(default)]
-    pub baselines: BTreeMap<String, Option<String>>,
 }
 
 /// The scored part of a `diagnosis.json`.
@@ -50,7 +45,6 @@ struct Diagnosis {
     #[serde(rename = "where")]
     location: Option<Location>,
     runtime_s: Option<f64>,
-    baselines: Option<BTreeMap<String, Option<String>>>,
 }
 
 #[derive(Deserialize)]
@@ -106,7 +100,6 @@ impl Verdict {
             tied: read.tied.unwrap_or_default(),
             stage: known.map(|k| k.spec().stage.name().to_owned()).or(placed.map(|s| s.stage)),
             runtime_s: read.runtime_s.unwrap_or(0.0),
-            baselines: read.baselines.unwrap_or_default(),
             named: read.named,
             candidates: candidates.into_iter().map(|c| (c.effects, c.probability)).collect(),
         })
@@ -152,12 +145,10 @@ mod tests {
             "candidates": [ { "effects": ["leak"], "probability": 0.8, "gap_before": 41.0,
                               "gap_after": 1.4, "closed": 0.96 } ],
             "where": { "stages": [ { "stage": "sensing", "share": 0.9 } ] },
-            "baselines": { "bic": "supply_sag", "signature": null }, "runtime_s": 3.1 }"#;
+            "runtime_s": 3.1 }"#;
         let mut value: Value = serde_json::from_str(text).expect("JSON");
         let verdict = Verdict::from_diagnosis("case-001", &value).expect("a verdict");
         assert_eq!(verdict.stage.as_deref(), Some("pneumatics"));
-        assert_eq!(verdict.baselines["bic"].as_deref(), Some("supply_sag"));
-        assert_eq!(verdict.baselines["signature"], None);
         value["verdict"] = "partial".into();
         value["tied"] = serde_json::json!(["supply_sag"]);
         let partial = Verdict::from_diagnosis("case-001", &value).expect("a verdict");

@@ -34,7 +34,6 @@ fn verdict(case: &str, verdict: &str, named: &[&str], set: &[&str], p: f64) -> V
         candidates: vec![(own(named), p)],
         stage: Some("sensing".into()),
         runtime_s: 2.0,
-        baselines: BTreeMap::new(),
     }
 }
 
@@ -143,42 +142,6 @@ fn several_effects_are_scored_by_how_many_are_named() {
     assert_eq!(score.compounds.one_named, rate(2, 2));
     assert_eq!(score.dominant_named, rate(1, 1));
     assert_eq!(score.misses.len(), 1);
-}
-
-#[test]
-fn simpler_methods_are_scored_on_the_same_cases() {
-    let slip = ("sleeve_slip", Stage::Sensing);
-    let truth = truth(&[
-        ("strong", label(CaseKind::Single, &[slip], 20.0)),
-        ("weak", label(CaseKind::Single, &[slip], 0.5)),
-        ("faint", label(CaseKind::Single, &[slip], 0.05)),
-        ("null", label(CaseKind::Null, &[], 0.0)),
-        ("two", label(CaseKind::Compound, &[slip, ("leak", Stage::Pneumatics)], 9.0)),
-    ]);
-    let said = |case: &str, drop: Option<&str>, bic: Option<&str>| {
-        let own = |name: Option<&str>| name.map(str::to_owned);
-        let baselines = [("largest_drop", own(drop)), ("bic", own(bic))];
-        let baselines = baselines.map(|(method, name)| (method.to_owned(), name)).into();
-        Verdict { baselines, ..verdict(case, "effect", &["sleeve_slip"], &["sleeve_slip"], 0.9) }
-    };
-    let verdicts = [
-        said("strong", Some("leak"), Some("sleeve_slip")),
-        said("weak", None, Some("leak")),
-        said("faint", None, Some("leak")),
-        said("null", None, Some("thermal_drift")),
-        said("two", Some("sleeve_slip"), None),
-    ];
-    let score = Score::of(&truth, &verdicts).expect("matching cases");
-    let (drop, bic) = (&score.baselines["largest_drop"], &score.baselines["bic"]);
-    // Neither the faint single nor the two effects count.
-    assert_eq!(
-        (drop.top1, drop.top1_above_10, drop.false_names),
-        (rate(0, 2), rate(0, 1), rate(0, 1))
-    );
-    assert_eq!(
-        (bic.top1, bic.top1_above_10, bic.false_names),
-        (rate(1, 2), rate(1, 1), rate(1, 1))
-    );
 }
 
 #[test]

@@ -28,7 +28,6 @@ use crate::{
     },
     record::{columns_alone::columns_alone, examine, gross::Gross},
     search::{
-        baselines::baselines,
         selection::{Found, Looked, Search},
         variants::{between_rows, likelier, re_estimated},
     },
@@ -509,7 +508,6 @@ fn report(
         let responses = responses(cause.problem, &evidence, &cause.found.best, stage);
         evidence.responses = if_possible(responses)?.unwrap_or_default();
     }
-    let simpler = || baselines(&searched.problem, &searched.tried, thresholds.null_excess);
     let mut diagnosis = Diagnosis {
         schema: 1,
         verdict: judged.kind,
@@ -538,10 +536,6 @@ fn report(
         identifiability,
         transfer: None,
         next_experiment: None,
-        baselines: match options.baselines {
-            true => if_possible(simpler())?,
-            false => None,
-        },
         notes,
         reservations,
         rows_used: simulator.description().rows_used(),

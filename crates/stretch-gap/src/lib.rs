@@ -53,7 +53,6 @@ pub use record::{
     columns_alone::copied,
     gross::{Gross, GrossKind},
 };
-pub use search::baselines::Baselines;
 pub use stretch_effects::EffectParameter;
 pub use verdict::{
     answer::{Answer, Closed, MissingEffect},

@@ -17,8 +17,6 @@ pub struct Options {
     pub threads: usize,
     /// Seed of the bootstrap.
     pub seed: u64,
-    /// Whether simpler methods are also run for comparison.
-    pub baselines: bool,
     /// Whether [responses](crate::Responses) to the parameters of the best set of effects are
     /// computed. A report page needs them to let a reader vary these parameters.
     pub responses: bool,
@@ -39,7 +37,6 @@ impl Default for Options {
             depth: DEPTH,
             threads: 0,
             seed: 1,
-            baselines: false,
             responses: false,
             detection_limits: false,
             thresholds: Thresholds::frozen(),

@@ -122,8 +122,7 @@ fn a_diagnosis_goes_through_json_whole() {
         Toy::of(&[Law::Line]).hiding(&[(Effect::Play, &[0.2])]),
     ];
     for toy in toys {
-        let options = Options { baselines: true, ..Options::default() };
-        let (told, _) = evidenced(&toy.measured(7), &options);
+        let (told, _) = evidenced(&toy.measured(7), &Options::default());
         let text = serde_json::to_string(&told).expect("written");
         let back: Diagnosis = serde_json::from_str(&text).expect("read");
         // Numbers are equal to the bit, or differ by a rounding.

@@ -1,7 +1,7 @@
 //! Slow drift and offsets that a simulator describes are no effects, and other effects are still
 //! found.
 
-use stretch_gap::{Options, SlowDrift, VerdictKind};
+use stretch_gap::{SlowDrift, VerdictKind};
 
 use crate::toys::{Effect, Law, Measured, Toy, slow, texts};
 
@@ -121,31 +121,6 @@ fn an_effect_beside_slow_noise_is_found() {
         let value = told.candidates[0].parameters[0].value;
         approx::assert_abs_diff_eq!(value, 0.05, epsilon = 0.01);
     }
-}
-
-/// Simpler methods name a single hidden effect, and nothing in noise.
-#[test]
-fn simpler_methods_name_a_strong_effect_and_no_noise() {
-    let options = Options { baselines: true, ..Options::default() };
-    for effect in [Effect::Play, Effect::Quadratic, Effect::Cubic] {
-        let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(effect, &[0.2])]);
-        let (told, _) = toy.measured(1).diagnosed_by(&options);
-        let simpler = told.baselines.expect("they were asked for");
-        let name = Some(effect.name().to_owned());
-        assert_eq!(simpler.bic, name);
-        assert_eq!(simpler.largest_drop, name);
-        // The signature is the change by one size of the effect. Its shape is the right one only if the effect is
-        // linear in its size, which a play is not.
-        if effect != Effect::Play {
-            assert_eq!(simpler.signature, name);
-        }
-    }
-    let quiet = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).measured(2);
-    let (told, _) = quiet.diagnosed_by(&options);
-    let simpler = told.baselines.expect("they were asked for");
-    assert_eq!((simpler.largest_drop, simpler.signature), (None, None));
-    let plain = quiet.diagnosed().0;
-    assert_eq!(plain.baselines, None);
 }
 
 /// If a drift is extrapolated to a test trial that is later than all fitted trials, a note states the fitted and the

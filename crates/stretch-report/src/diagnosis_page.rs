@@ -9,9 +9,9 @@ use super::{
     bar_figure::{Bar, Row, Scale, bar_figure, picking},
     canvas::Ink,
     diagnosis_tables::{
-        baseline_table, candidate_numbers_table, candidate_table, difference_table, effects,
-        limit_table, parameter_table, probable, run_table, slice_table, stage_table,
-        transfer_in_words, transfer_table,
+        candidate_numbers_table, candidate_table, difference_table, effects, limit_table,
+        parameter_table, probable, run_table, slice_table, stage_table, transfer_in_words,
+        transfer_table,
     },
     figure::Figure,
     first_seconds::{GIVEN, causes, facts, headline},
@@ -418,10 +418,6 @@ fn next(page: &mut Page, d: &Diagnosis) {
 }
 
 fn numbers(page: &mut Page, d: &Diagnosis) {
-    if let Some(said) = &d.baselines {
-        page.section("What simpler methods would have said", "");
-        page.table(&baseline_table(said));
-    }
     page.section("All numbers", "");
     page.list(&d.notes.iter().map(ToString::to_string).collect::<Vec<_>>());
     for stage in &d.location.stages {

@@ -2,8 +2,8 @@
 
 use stretch_data::listed;
 use stretch_gap::{
-    Baselines, Candidate, DetectionLimit, Diagnosis, EffectStability, EffectValue, Identified,
-    Knowledge, SliceGap, StageGap, Transfer, TransferError,
+    Candidate, DetectionLimit, Diagnosis, EffectStability, EffectValue, Identified, Knowledge,
+    SliceGap, StageGap, Transfer, TransferError,
 };
 use stretch_problem::{ByTrial, RunFit};
 
@@ -154,17 +154,6 @@ pub fn transfer_table(transfer: &Transfer) -> Table {
     )
 }
 
-/// A table of the effects that simpler methods named.
-pub fn baseline_table(said: &Baselines) -> Table {
-    let row = |(key, name): (&str, &Option<String>)| {
-        vec![method_in_words(key).to_owned(), name.as_deref().unwrap_or("nothing").to_owned()]
-    };
-    let Baselines { largest_drop, signature, bic } = said;
-    let methods = [("largest_drop", largest_drop), ("signature", signature), ("bic", bic)];
-    let caption = "Methods that leave one step out, on the same data";
-    Table::new(caption, &["Method", "Names"], methods.map(row))
-}
-
 /// A table of every slice of a stage; `None` when there are none.
 pub(crate) fn slice_table(slices: &[SliceGap], stage: &str) -> Option<Table> {
     let rows: Vec<Vec<String>> = slices
@@ -290,14 +279,4 @@ pub fn transfer_in_words(transfer: &Transfer) -> Option<String> {
             listed(&worse)
         )
     })
-}
-
-/// The name of a simpler method, from its key in the JSON of a diagnosis.
-pub fn method_in_words(key: &str) -> &str {
-    match key {
-        "largest_drop" => "largest drop of the error, parameters as shipped",
-        "signature" => "likeness of a one-step signature",
-        "bic" => "BIC alone",
-        other => other,
-    }
 }

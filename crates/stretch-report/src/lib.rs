@@ -34,8 +34,8 @@ pub use calibration_page::{
 pub use calibration_tables::{comparison_table, method_table, order_table, signal_table};
 pub use diagnosis_page::diagnosis_page;
 pub use diagnosis_tables::{
-    baseline_table, candidate_numbers_table, candidate_table, difference_table, limit_table,
-    method_in_words, run_table, stage_table, transfer_in_words, transfer_table,
+    candidate_numbers_table, candidate_table, difference_table, limit_table, run_table,
+    stage_table, transfer_in_words, transfer_table,
 };
 pub use markup::{percent, plain_number as number, times};
 pub use output_table::output_table;

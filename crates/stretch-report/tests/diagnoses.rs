@@ -186,7 +186,6 @@ fn one_missing() -> Diagnosis {
             "linear": errors(3.1, 4.2, 3.2), "poly13": errors(1.1, 2.4, 1.2), "unit": "percent_full_scale",
         }))
         .expect("a transfer"),
-        baselines: from_value(json!({"largest_drop": LOOP, "signature": PLAY, "bic": null})).expect("names"),
         next_experiment: next_experiment(14.0),
         ..naming(VerdictKind::Effect, "one missing", &[PLAY], &[LOOP])
     }

@@ -782,7 +782,6 @@ def diagnose(
         "depth": entries.whole("depth", depth, 1),
         "seed": entries.whole("seed", seed, 0),
         "threads": entries.whole("threads", threads, 0),
-        "baselines": False,
         "budget": None if budget is None else entries.whole("budget", budget, 1),
         "batch": 1 if asked is None else asked.batch,
         "answers_all": asked is not None and asked.answers_all,

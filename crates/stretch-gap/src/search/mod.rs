@@ -5,10 +5,9 @@
 //! with one simulation per start ([`screen`]); the promising ones are fitted ([`sets`]) and added
 //! if they meet the criteria ([`acceptance`]). Two other explanations are compared ([`variants`]):
 //! commands that switch between rows, and other sizes of the nuisances.
-//! [`baselines`] are simpler methods. Imports: `numerics`, `problem`, `fit`.
+//! Imports: `numerics`, `problem`, `fit`.
 
 pub(crate) mod acceptance;
-pub(crate) mod baselines;
 pub(crate) mod screen;
 pub(crate) mod selection;
 pub(crate) mod sets;

@@ -17,7 +17,6 @@ use crate::{
     missing::Proposed,
     problem::{record_facts::RowsUsed, simulator::ModelRuns, thresholds::Thresholds},
     record::gross::Gross,
-    search::baselines::Baselines,
     verdict::{answer::Answer, note::Note},
 };
 
@@ -178,8 +177,6 @@ pub struct Diagnosis {
     pub transfer: Option<Transfer>,
     /// The experiment that should be done next.
     pub next_experiment: Option<NextExperiment>,
-    /// Answers of simpler methods.
-    pub baselines: Option<Baselines>,
     /// Observations and assumptions.
     pub notes: Vec<Note>,
     /// Those of the notes that give a reason why a gap may exist although none was found.
@@ -188,7 +185,7 @@ pub struct Diagnosis {
     /// Rows that the diagnosis used, and rows that were read.
     #[serde(default)]
     pub rows_used: RowsUsed,
-    /// Number of simulations of one stage, without those of simpler methods.
+    /// Number of simulations of one stage.
     #[serde(default)]
     pub simulations: usize,
     /// Runs of a black-box simulator, if its runs are costly.
@@ -255,9 +252,6 @@ impl Diagnosis {
         let names = names.chain(self.stabilities.iter_mut().map(|s| &mut s.effect));
         let limits = self.detection_limits.iter_mut();
         let names = names.chain(limits.flat_map(|l| l.like.iter_mut().chain([&mut l.effect])));
-        let simpler = self.baselines.iter_mut();
-        let simpler = simpler.flat_map(|b| [&mut b.largest_drop, &mut b.signature, &mut b.bic]);
-        let names = names.chain(simpler.flatten());
         let next = self.next_experiment.iter_mut();
         let names = names.chain(next.flat_map(|next| &mut next.separates));
         names.for_each(|name| *name = rename(name));

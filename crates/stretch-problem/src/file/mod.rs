@@ -5,7 +5,7 @@ mod simulator;
 
 use std::path::{Path, PathBuf};
 
-use stretch_data::{DataError, Remarks, SessionTrial, TomlFile};
+use stretch_data::{DataError, Remarks, RigFile, SessionTrial, TomlFile};
 use stretch_recording::{ReadOptions, Recording};
 
 use crate::{black_box::spec::ProblemSpec, error::ProblemError, worker::WorkersSpec};
@@ -16,6 +16,9 @@ pub(crate) use simulator::{simulator, simulator_schema};
 
 /// Name of a problem's file in a folder.
 pub(crate) const IN_FOLDER: &str = "problem.toml";
+/// What is wrong with a rig file in the place of a problem's file.
+const RIG: &str = "this file describes a rig or a gauge that is built in, not a problem; to see what it leaves of a new recording, run \
+                   stretch diagnose NEW --rig with this file";
 /// The current folder.
 const HERE: &str = ".";
 
@@ -61,8 +64,15 @@ impl ProblemSpec {
     }
 
     fn from_file(file: &TomlFile) -> Result<Self, DataError> {
-        let mut spec: Self = file.parse()?;
         let fail = |key: &str, problem: &str| Err(file.error(key, problem));
+        let mut spec: Self = match file.parse() {
+            Ok(spec) => spec,
+            Err(error) => {
+                let rig: Option<RigFile> = file.parse().ok();
+                let stage = rig.and_then(|rig| rig.stages.into_keys().next());
+                return stage.map_or(Err(error), |stage| fail(&stage, RIG));
+            }
+        };
         let Some(simulator) = &spec.simulator else {
             return fail(
                 "simulator",

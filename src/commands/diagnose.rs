@@ -20,7 +20,7 @@ use super::{
     diagnosis_output::{print_by_trial, text, write_fix, write_snippets},
     json::Json,
     reading::{Rows, column, columns},
-    shared::{detail, say, say_first, spinner, stage_text, tell},
+    shared::{detail, doubt, say, say_first, spinner, stage_text, tell},
 };
 use crate::display::{fail, is_quiet, is_verbose, warn};
 
@@ -306,6 +306,7 @@ pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
         true => &examined.diagnosis,
         false => &in_words(&examined.diagnosis),
     };
+    diagnosis.reservations.iter().for_each(doubt);
     say_first(&diagnosis.sentence)?;
     if is_quiet() {
         return Ok(());

@@ -66,11 +66,12 @@ pub(crate) fn text(
             runs.count, diagnosis.simulations
         ));
     }
-    if !diagnosis.notes.is_empty() {
+    // Doubts are printed before the sentence.
+    let reserved = &diagnosis.reservations;
+    let notes: Vec<_> = diagnosis.notes.iter().filter(|note| !reserved.contains(note)).collect();
+    if !notes.is_empty() {
         out.push("\nNotes:".to_owned());
-        for note in &diagnosis.notes {
-            out.push(format!("- {note}"));
-        }
+        out.extend(notes.into_iter().map(|note| format!("- {note}")));
     }
     out.join("\n").trim_end().to_owned()
 }

@@ -109,9 +109,12 @@ impl Problem {
             };
         }
         diagnosis.set_next_experiment(proposal.as_ref().map(|p| p.next.clone()));
+        let of = |sentences: Vec<String>| sentences.into_iter().map(Note::from);
+        let doubts: Vec<Note> = of(source.doubts()).collect();
         let notes = &mut diagnosis.notes;
-        notes.splice(0..0, source.notes().into_iter().map(Note::from));
-        notes.extend(source.afterwards().into_iter().map(Note::from));
+        notes.splice(0..0, doubts.iter().cloned().chain(of(source.notes())));
+        notes.extend(of(source.afterwards()));
+        diagnosis.reservations.splice(0..0, doubts);
         Ok(Examined {
             name: self.name.clone(),
             seed: options.seed,

@@ -24,6 +24,11 @@ pub trait Diagnosable: Laboratory + Debug + Send {
     /// Notes on what was done to the recordings and which effects are not looked for, in sentences.
     fn notes(&self) -> Vec<String>;
 
+    /// What may be wrong with the recordings, in sentences.
+    fn doubts(&self) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Notes that are known only after the diagnosis, in sentences.
     fn afterwards(&self) -> Vec<String> {
         Vec::new()

@@ -69,6 +69,10 @@ impl<B: BuiltIn + Debug + Send> Diagnosable for B {
         self.bench().columns.notes.clone()
     }
 
+    fn doubts(&self) -> Vec<String> {
+        self.bench().columns.doubts.clone()
+    }
+
     fn column(&self, name: &str) -> Option<Vec<f64>> {
         self.bench().columns.of(name).map(<[f64]>::to_vec)
     }

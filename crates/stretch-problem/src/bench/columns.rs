@@ -44,6 +44,8 @@ pub(crate) struct Columns {
     pub(crate) dt_s: f64,
     rows: Rows,
     pub(crate) notes: Vec<String>,
+    /// What may be wrong with the recording, in sentences.
+    pub(crate) doubts: Vec<String>,
 }
 
 impl Columns {
@@ -72,6 +74,7 @@ impl Columns {
             dt_s: session.dt_s(),
             rows: session.rows(),
             notes: session.notes().to_vec(),
+            doubts: Vec::new(),
         })
     }
 

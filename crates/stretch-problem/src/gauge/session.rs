@@ -31,8 +31,7 @@ pub(super) fn read(
         names.push(PRESSURE.to_owned());
     }
     let mut columns = Columns::built_in(trials, names, &[reference, signal], 1, false)?;
-    let notes = checked(&columns)?;
-    columns.notes.extend(notes);
+    check(&mut columns)?;
     Ok(columns)
 }
 
@@ -46,8 +45,8 @@ pub(super) fn noise(columns: &Columns, values: &[f64]) -> Noise {
     Noise::of_differences(columns.looked_at().into_iter().map(|r| &values[r]), columns.dt_s)
 }
 
-/// Checks reference and signal, and returns notes on them.
-fn checked(columns: &Columns) -> Result<Vec<String>, ProblemError> {
+/// Checks reference and signal, and adds notes and doubts about them.
+fn check(columns: &mut Columns) -> Result<(), ProblemError> {
     let both = || columns.names.iter().zip(&columns.values).take(PRESSED);
     let (reference, signal) = (&columns.names[REFERENCE], &columns.names[SIGNAL]);
     if reference == "bridge_v" || signal == "length_mm" {
@@ -56,7 +55,7 @@ fn checked(columns: &Columns) -> Result<Vec<String>, ProblemError> {
             "exchange them: the reference is the length, the signal is the output of the gauge";
         return Err(ProblemError::value(column, "the two look swapped", hint));
     }
-    let (mut shares, mut clipped) = (Vec::new(), Vec::new());
+    let (mut shares, mut notes, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
     for (name, values) in both() {
         let (low, high) = columns.range(values);
         if high <= low {
@@ -64,11 +63,10 @@ fn checked(columns: &Columns) -> Result<Vec<String>, ProblemError> {
         }
         let sd = noise(columns, values).sd();
         shares.push(sd / (high - low));
-        clipped.extend(rails(columns, name, sd));
+        doubts.extend(rails(columns, name, sd));
     }
-    let mut notes = Vec::new();
     if shares[0] > 3.0 * shares[1] {
-        notes.push(format!(
+        doubts.push(format!(
             "{reference} is noisier than {signal}, each compared with its own range: are reference and signal swapped?"
         ));
     }
@@ -80,6 +78,7 @@ fn checked(columns: &Columns) -> Result<Vec<String>, ProblemError> {
             ));
         }
     }
-    notes.extend(clipped);
-    Ok(notes)
+    columns.notes.extend(notes);
+    columns.doubts.extend(doubts);
+    Ok(())
 }

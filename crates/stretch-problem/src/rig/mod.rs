@@ -101,7 +101,7 @@ impl RigSimulator {
         ];
         let saturated = recorders.into_iter().flat_map(|(name, sd)| rails(&columns, name, sd));
         let saturated: Vec<String> = saturated.collect();
-        columns.notes.extend(saturated);
+        columns.doubts.extend(saturated);
         let noises = Noises::of(&rig.params, &columns);
         let inputs = Inputs::of(&columns, &noises, None, 1e-3 * rig.params[Key::PS]);
         let stage_kinds = match inputs.pressure {

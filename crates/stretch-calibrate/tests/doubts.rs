@@ -1,6 +1,8 @@
 //! Each mistake in a trial is reported once, and no other trial is reported.
 
-use stretch_calibrate::{LiveReceptor, ModelKind, Options, Seen, calibrate};
+use stretch_calibrate::{
+    LiveReceptor, ModelKind, Options, Seen, calibrate, evaluate, evaluation_doubts,
+};
 use stretch_data::{Channel, Trial};
 
 /// A muscle's length, in mm, and a gauge with a play, a curve and noise, in V.
@@ -28,7 +30,7 @@ fn trial(number: u32) -> Trial {
 fn notes(trials: &[Trial]) -> Vec<String> {
     // A linear model gives no note about a preferred order.
     let options = Options { model: ModelKind::Linear, ..Options::default() };
-    calibrate(trials, &options).expect("a calibration").notes
+    calibrate(trials, &options).expect("a calibration").doubts
 }
 
 const LENGTH: usize = 0;
@@ -182,5 +184,32 @@ fn rows_that_go_back_in_time_do_not_lower_the_rate_of_a_stream() {
         let found = text.split(' ').nth(3).expect(name);
         let found_hz: f64 = found.parse().expect(name);
         assert!((found_hz / rate_hz - 1.0).abs() < 0.05, "{name}: {text}");
+    }
+}
+
+/// Each fault of a test trial has one doubt, which names it, and a sound trial has none.
+#[test]
+fn a_fault_of_a_test_trial_has_a_doubt_of_its_own() {
+    let options = Options { model: ModelKind::Linear, ..Options::default() };
+    let calibration =
+        calibrate(&[trial(0), trial(1)], &options).expect("a calibration").calibration;
+    // The play of the gauge adds about 60 ms to every delay.
+    let members: [(&[&str], &str, Spoil); 6] = [
+        (&[], "", |_| ()),
+        (&["delayed"], "ms after the reference", |t| t.channels[SIGNAL].values.rotate_right(40)),
+        (&["delayed"], "ms before the reference", |t| t.channels[SIGNAL].values.rotate_left(40)),
+        (&["clipped_signal"], "stays at 1.9", |t| change(t, SIGNAL, |v| v.min(1.9))),
+        (&["other_unit"], "with the other sign", |t| change(t, SIGNAL, |v| -v)),
+        (&["other_sensor"], "the calibrated sensor", |t| change(t, SIGNAL, |v| 7.0 + v)),
+    ];
+    for (codes, says, spoil) in members {
+        let mut tested = trial(2);
+        spoil(&mut tested);
+        let tested = [tested];
+        let named = [("own", &calibration)];
+        let evaluation = evaluate(&named, &tested).expect("errors");
+        let doubts = evaluation_doubts(&named, &tested, &evaluation);
+        assert_eq!(doubts.iter().map(|doubt| doubt.code).collect::<Vec<_>>(), codes, "{doubts:?}");
+        assert!(doubts.iter().all(|doubt| doubt.text.contains(says)), "{doubts:?}");
     }
 }

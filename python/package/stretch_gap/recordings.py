@@ -25,8 +25,8 @@ class DoubtWarning(UserWarning):
         Sentence for the user.
     code : str
         Name of the reason for programs. It is stable between releases: `missing_samples`, `slow_clock`, `large_tolerance`,
-        `other_rate`, `other_unit`, `constant_signal`, `outside_range`, `fitted_trials`, `other_reference`,
-        `constant_error`, `worse_than_the_mean`, `constant_reference` or `without_estimate`.
+        `other_rate`, `other_unit`, `other_sensor`, `constant_signal`, `clipped_signal`, `outside_range`, `fitted_trials`,
+        `other_reference`, `constant_error`, `delayed`, `worse_than_the_mean`, `constant_reference` or `without_estimate`.
 
     Attributes
     ----------

@@ -8,7 +8,10 @@ use crate::{
     prepare::{DEGREES_IN_A_RADIAN, Line, without_gross_errors},
 };
 
-use super::{doubt::Doubt, evaluate::MethodErrors};
+use super::{
+    doubt::Doubt,
+    evaluate::{MethodErrors, TrialErrors},
+};
 
 /// A fit whose error is more than this share of the reference's standard deviation explains nothing, because the mean
 /// of the reference alone has an error that is at most about a twentieth larger. (The same margin of a twentieth
@@ -137,6 +140,42 @@ pub(super) fn off_throughout(
         )
     });
     text.map(|text| Doubt::new("constant_error", text))
+}
+
+/// Returns a doubt for estimates of a trial that come a constant time after or before the reference, if most of the error
+/// comes from that time:
+///
+/// ```text
+/// rmse > 1.25 fit  and  mean of (estimate(t + lag) - reference(t))^2 <= rmse^2 / 2
+/// ```
+pub(super) fn delayed(
+    trial: &TrialErrors,
+    method: usize,
+    fit_rmse: f64,
+    unit: &str,
+) -> Option<Doubt> {
+    let MethodErrors { rmse, lag_s, .. } = trial.methods[method];
+    let (first, last) = (trial.time_s.first()?, trial.time_s.last()?);
+    let samples = (lag_s? * (trial.time_s.len() - 1) as f64 / (last - first)).round();
+    let (late, early) = (samples.max(0.0) as usize, (-samples).max(0.0) as usize);
+    let estimates = trial.estimates[method].iter().skip(late);
+    let pairs = estimates.zip(trial.reference.iter().skip(early));
+    let errors = pairs.map(|(estimate, truth)| estimate - truth).filter(|error| error.is_finite());
+    let (sum, count) = errors.fold((0.0, 0.0), |(sum, n), error| (sum + error * error, n + 1.0));
+    let undelayed = (sum / f64::max(count, 1.0)).sqrt();
+    let is_most = samples != 0.0 && 2.0 * undelayed * undelayed <= rmse * rmse;
+    let text = (is_most && rmse > ALIKE * fit_rmse).then(|| {
+        let with_unit = |x: f64| format!("{} {unit}", in_digits(x, 4)).trim_end().to_owned();
+        let side = if samples > 0.0 { "after" } else { "before" };
+        format!(
+            "the estimate comes {:.0} ms {side} the reference, and without this delay the RMSE would be {} instead of {}: were signal \
+             and reference recorded by two recorders that did not start together? If so, shift the times of one of them",
+            1e3 * lag_s.unwrap_or_default().abs(),
+            with_unit(undelayed),
+            with_unit(rmse)
+        )
+    });
+    text.map(|text| Doubt::new("delayed", text))
 }
 
 /// Factors between units of a reference: decimal prefixes, and degrees in a radian.

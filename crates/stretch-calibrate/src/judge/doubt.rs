@@ -9,21 +9,24 @@ use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::{
     acceptance::{
-        beside_a_constant, fitted_trials, off_throughout, other_reference, outside_range,
+        beside_a_constant, delayed, fitted_trials, off_throughout, other_reference, outside_range,
         without_estimate, worse_than_the_mean,
     },
     apply::{Applied, at_rate},
     evaluate::Evaluation,
     reach::Reach,
 };
-use crate::{error::PACE_TOLERANCE, prepare::Line};
+use crate::{
+    error::PACE_TOLERANCE,
+    prepare::{Line, clipped},
+};
 
 /// A doubt about a result. `Display` writes its text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Doubt {
-    /// Stable code for programs: `other_rate`, `constant_signal`, `other_unit`, `outside_range`, `fitted_trials`,
-    /// `other_reference`, `constant_error`, `worse_than_the_mean`, `constant_reference` or
-    /// `without_estimate`.
+    /// Stable code for programs: `other_rate`, `constant_signal`, `clipped_signal`, `other_unit`, `other_sensor`,
+    /// `outside_range`, `fitted_trials`, `other_reference`, `constant_error`, `delayed`, `worse_than_the_mean`,
+    /// `constant_reference` or `without_estimate`.
     pub code: &'static str,
     /// A sentence for users that includes advice.
     pub text: String,
@@ -34,13 +37,14 @@ impl Doubt {
         Self { code, text }
     }
 
-    /// Whether this doubt explains every other one: the signal is in another unit, or the sensor is not connected.
+    /// Whether this doubt explains every other one: the signal is in another unit or from another sensor, or the sensor is
+    /// not connected.
     pub fn explains_others(&self) -> bool {
-        matches!(self.code, "other_unit" | "constant_signal")
+        matches!(self.code, "other_unit" | "other_sensor" | "constant_signal")
     }
 
     /// Returns doubts about a method of an evaluation, by its place in it: trials whose reference is in another unit or
-    /// reversed, trials whose estimates are shifted, and errors that say nothing. Doubts about a trial name it if there
+    /// reversed, trials whose estimates are shifted or delayed, and errors that say nothing. Doubts about a trial name it if there
     /// are several. `fit_rmse` is the RMSE of the method's fit, in the unit of the reference, and `reference` the name of
     /// that column.
     pub fn of_method(
@@ -58,7 +62,9 @@ impl Doubt {
                 trial.estimates[method].iter().copied().zip(trial.reference.iter().copied());
             let line = Line::through(pairs.filter(|(estimate, _)| estimate.is_finite()));
             let shift = || off_throughout(&trial.methods[method], (fit_rmse, range), unit);
-            let Some(found) = other_reference(&line, reference).or_else(shift) else { continue };
+            let delay = || delayed(trial, method, fit_rmse, unit);
+            let found = other_reference(&line, reference).or_else(shift).or_else(delay);
+            let Some(found) = found else { continue };
             match all.iter_mut().find(|doubt| doubt.code == found.code) {
                 Some(first) => first.text = format!("{}; also {}", first.text, trial.trial),
                 None if trials.len() == 1 => all.push(found),
@@ -205,7 +211,9 @@ pub fn evaluation_doubts(
         let spec = calibration.spec();
         let columns = [spec.signal.as_str(), spec.reference.as_str()];
         let fitted = fitted_trials(&spec.provenance, &columns, trials);
-        all.extend(paces.chain(fitted).map(|doubt| doubt.of(name)));
+        let clipped = trials.iter().filter_map(|trial| clipped(trial, columns));
+        let clipped = clipped.map(|text| Doubt::new("clipped_signal", text));
+        all.extend(paces.chain(fitted).chain(clipped).map(|doubt| doubt.of(name)));
     }
     // The first method is the raw signal.
     for (method, (name, calibration)) in (1..).zip(calibrations) {

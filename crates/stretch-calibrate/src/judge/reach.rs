@@ -15,6 +15,10 @@ const COUNT: usize = 19;
 /// Distance from the range, as a share of its span, beyond which a sample is far outside.
 const FAR: f64 = 0.5;
 
+/// What to ask about samples of which most are far outside in every unit.
+const OTHER: &str =
+    ": is it the calibrated sensor, in the same unit? If so, calibrate on trials with this range";
+
 /// Smallest number of equal samples from which a sensor counts as not connected. Fewer may come from a rest and a
 /// coarse converter.
 const CONSTANT: u64 = 100;
@@ -42,6 +46,8 @@ pub struct Reach {
     seen: Interval,
     /// For each power of ten, the number of samples that lie inside after multiplication by that power.
     inside: [u64; COUNT],
+    /// Number of samples that lie inside with the other sign.
+    reversed: u64,
     /// Number of samples that are [far](FAR) outside.
     far: u64,
     /// Sum of the distances from the range, as shares of its span.
@@ -54,7 +60,7 @@ impl Reach {
         let unit = unit_of(calibration.spec().signal.as_str());
         let range = calibration.spec().signal_range;
         let (seen, inside) = (extent(std::iter::empty()), [0; COUNT]);
-        Self { range, unit, samples: 0, seen, inside, far: 0, excess: 0.0 }
+        Self { range, unit, samples: 0, seen, inside, reversed: 0, far: 0, excess: 0.0 }
     }
 
     /// Counts a sample; missing samples are ignored.
@@ -68,14 +74,15 @@ impl Reach {
         let excess = (signal - self.range.clamp(signal)).abs() / self.range.span();
         self.excess += excess;
         self.far += u64::from(excess > FAR);
+        self.reversed += u64::from(self.range.contains(-signal));
         for (power, inside) in POWERS.zip(&mut self.inside) {
             *inside += u64::from(self.range.contains(signal * ten_to(power)));
         }
     }
 
     /// Returns a doubt about a log whose samples are all equal, or of which most samples lie outside the range. If most
-    /// samples would lie inside in another unit, the sentence names this unit. It asks whether this is the calibrated
-    /// sensor only if most samples are far outside.
+    /// samples would lie inside in another unit, the sentence names this unit; if they would lie inside with the other
+    /// sign, it says so. It asks whether this is the calibrated sensor only if most samples are far outside.
     pub fn doubt(&self) -> Option<Doubt> {
         if self.samples >= CONSTANT && self.seen.min >= self.seen.max {
             let (count, value) = (thousands(self.samples), self.seen.min);
@@ -107,6 +114,15 @@ impl Reach {
                     format!("{sentence}: {asked}? {inside} lie inside when {how} by {by}"),
                 )
             }
+            None if 2 * self.reversed > self.samples => {
+                let inside = thousands(self.reversed);
+                let asked = "are the wires of the sensor exchanged?";
+                (
+                    "other_unit",
+                    format!("{sentence}: {asked} {inside} lie inside with the other sign"),
+                )
+            }
+            None if 2 * self.far > self.samples => ("other_sensor", format!("{sentence}{OTHER}")),
             None => ("outside_range", format!("{sentence}{}", self.advice(outside))),
         };
         Some(Doubt::new(code, text))
@@ -114,12 +130,8 @@ impl Reach {
 }
 
 impl Reach {
-    /// Returns what to do about samples of which most are `outside` in every unit.
+    /// Returns what to do about samples of which most are `outside` in every unit, but few far outside.
     fn advice(&self, outside: u64) -> String {
-        if 2 * self.far > self.samples {
-            return ": is it the calibrated sensor, in the same unit? If so, calibrate on trials with this range"
-                .to_owned();
-        }
         let mean = 100.0 * self.excess / outside as f64;
         let share = |percent: f64| {
             if percent < 1.0 { 0.1 * (10.0 * percent).ceil() } else { percent.round() }
@@ -240,7 +252,8 @@ mod tests {
         let told = |factor: f64| {
             let seen = extent(std::iter::empty());
             let unit = "V".to_owned();
-            let mut reach = Reach { range, unit, samples: 0, seen, inside, far: 0, excess: 0.0 };
+            let mut reach =
+                Reach { range, unit, samples: 0, seen, inside, reversed: 0, far: 0, excess: 0.0 };
             (0..=10).for_each(|i| reach.take(factor * (0.1 * f64::from(i) - 0.05)));
             reach.take(factor);
             reach.doubt().map(|doubt| doubt.text).unwrap_or_default()

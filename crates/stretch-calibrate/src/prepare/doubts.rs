@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use rayon::prelude::*;
+use stretch_data::Trial;
 
 use crate::Options;
 
@@ -184,6 +185,15 @@ impl Held<'_> {
             && both.all(|((_, own), (_, its))| (0..2).all(|i| is_same(&own[i], &its[i])))
     }
 
+    /// Returns a sentence if the signal is stuck at an end of its range while the reference moves further.
+    fn clipped(&self, signal: &str, reference: &str) -> Option<String> {
+        let (end, name) = (self.stands_at()?, self.name);
+        Some(format!(
+            "{signal} stays at {end} in {name} while {reference} moves on: is the amplifier or the converter at its limit? Values beyond it are \
+             lost; lower the gain, or leave that part out"
+        ))
+    }
+
     /// Returns the end of the signal's range at which the signal is stuck, while the reference moves further in the
     /// same direction.
     fn stands_at(&self) -> Option<f64> {
@@ -215,6 +225,15 @@ impl Held<'_> {
         };
         ends.into_iter().find(|end| stands(*end)).map(|(end, _)| end)
     }
+}
+
+/// Returns a sentence if the signal of a trial is stuck at an end of its range while the reference moves further.
+pub(crate) fn clipped(trial: &Trial, [signal, reference]: [&str; 2]) -> Option<String> {
+    let columns = [signal, reference].map(|name| trial.channel(name));
+    let [Some(signals), Some(references)] = columns else { return None };
+    let piece = (0, [signals.to_vec(), references.to_vec(), Vec::new()]);
+    let line = Line::of(std::iter::once(&piece));
+    Held { name: &trial.name, parts: vec![&piece], line }.clipped(signal, reference)
 }
 
 /// Whether two columns are equal within the digits with which one of them was saved. Two recordings of
@@ -296,11 +315,8 @@ pub(super) fn doubts(
             said.push(format!(
                 "{signal} is {value} throughout {name} while {reference} moves: is the sensor connected? If it was not, leave that trial out"
             ));
-        } else if let Some(end) = trial.stands_at() {
-            said.push(format!(
-                "{signal} stays at {end} in {name} while {reference} moves on: is the amplifier or the converter at its limit? Values beyond it are \
-                 lost; lower the gain, or leave that part out"
-            ));
+        } else {
+            said.extend(trial.clipped(signal, reference));
         }
     }
     let others = || (0..held.len()).step_by(held.len().div_ceil(OTHERS).max(1));

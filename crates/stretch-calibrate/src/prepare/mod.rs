@@ -9,7 +9,7 @@ pub use gross_errors::without_gross_errors;
 pub use series::{Rated, RatedPart, extent, noise, rated, sample_rate_hz};
 pub use trials::{MOST_ROWS, check_rate, even, even_signals, pooled_range, provenance};
 
-pub(crate) use doubts::{DEGREES_IN_A_RADIAN, Line};
+pub(crate) use doubts::{DEGREES_IN_A_RADIAN, Line, clipped};
 pub(crate) use gross_errors::rows;
 pub(crate) use series::{branches, polarity, rates_at_use};
 pub(crate) use trials::{LEAST_TRIALS, Prepared, Tally, fold_of};

@@ -107,7 +107,7 @@ struct Made<'a> {
     model: String,
     fits: &'a [FitReport],
     models: &'a [ModelRow],
-    notes: &'a [String],
+    notes: Vec<&'a String>,
 }
 
 /// Fits a calibration. Returns it, and the fits, the compared models and notes as JSON.
@@ -128,13 +128,13 @@ pub(crate) fn calibrate(
             options.model = choice.model;
         }
         let mut made = stretch_calibrate::calibrate(&trials, &options)?;
-        made.notes.extend(explains_nothing(&made.fits).or_else(|| explains_little(&made.fits)));
+        made.doubts.extend(explains_nothing(&made.fits).or_else(|| explains_little(&made.fits)));
         made.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
         let said = serde_json::to_string(&Made {
             model: options.model.to_string(),
             fits: &made.fits,
             models: choice.as_ref().map_or(&[], |choice| &choice.rows),
-            notes: &made.notes,
+            notes: made.doubts.iter().chain(&made.notes).collect(),
         });
         Ok((calibrate_gauge(made.calibration, &trials, &options)?, said))
     };

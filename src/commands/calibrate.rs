@@ -28,7 +28,9 @@ use super::{
     calibration_text::{blocks_of_calibration, blocks_of_models, blocks_of_notes},
     json::Json,
     reading::{Recorded, columns, read_trials, with_columns_to_name},
-    shared::{Completed, detail, of_files, say_below, say_first, spinner, stage_text, with_unit},
+    shared::{
+        Completed, detail, doubt, of_files, say_below, say_first, spinner, stage_text, with_unit,
+    },
 };
 
 /// Fit a calibration to logged trials
@@ -426,12 +428,11 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let line =
         choice.is_none().then(|| worse_than_a_line(&calibrated, &trials, &options)).flatten();
     let first = line.into_iter().chain(gross_errors).chain(copied_signals(&trials, &candidates));
-    let first: Vec<String> = first.collect();
-    let doubts = first.len();
-    calibrated.notes.splice(0..0, first);
+    calibrated.doubts.splice(0..0, first);
     accept(&mut calibrated, &args)?;
     calibrated.notes.extend(causes.notes);
     calibrated.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
+    calibrated.doubts.iter().for_each(doubt);
     let mut outputs = Outputs::default();
     let gauge = calibrate_gauge(calibrated.calibration.clone(), &trials, &options);
     let gauge = gauge.map_err(named)?;
@@ -450,10 +451,9 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         "model": options.model.to_string(),
         "why": choice.as_ref().map(|choice| &choice.why),
         "fits": calibrated.fits,
-        "notes": calibrated.notes,
+        "notes": calibrated.doubts.iter().chain(&calibrated.notes).collect::<Vec<_>>(),
     });
     args.json.conclude(outputs, &answer, || {
-        let (doubts, notes) = calibrated.notes.split_at(doubts);
         let models = choice.as_ref().map(|choice| blocks_of_models(choice, &options.reference));
         let (sentence, tested) = match &choice {
             None => (judged, None),
@@ -464,10 +464,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         say_first(sentence)?;
         let fits = blocks_of_calibration(&calibrated, &ranking, choice.is_some());
         let tables = tested.into_iter().chain(models.into_iter().flatten()).chain(fits);
-        say_below(
-            blocks_of_notes(doubts).chain(tables).chain(blocks_of_notes(notes)),
-            args.written(),
-        )
+        say_below(tables.chain(blocks_of_notes(&calibrated.notes)), args.written())
     })
 }
 
@@ -504,13 +501,13 @@ fn rank(
 fn accept(calibrated: &mut Calibrated, args: &Args) -> anyhow::Result<()> {
     match explains_nothing(&calibrated.fits) {
         Some(why) if args.force => {
-            calibrated.notes.push(format!("{why}; written because of --force"))
+            calibrated.doubts.push(format!("{why}; written because of --force"))
         }
         Some(why) => {
             let refusal = anyhow!("nothing is written: {why}; give --force to write it anyway");
             return Err(of_files(refusal, &args.trials));
         }
-        None => calibrated.notes.extend(explains_little(&calibrated.fits)),
+        None => calibrated.doubts.extend(explains_little(&calibrated.fits)),
     }
     Ok(())
 }

@@ -16,7 +16,7 @@ use stretch_sleeve::{
 use super::{
     calibrate::{Args, Signal, other_columns},
     reading::{read_trials, with_columns_to_name},
-    shared::{of_files, say_below, say_first, stage_text, with_unit},
+    shared::{doubt, of_files, say_below, say_first, stage_text, with_unit},
 };
 use crate::table::{maybe, table};
 
@@ -84,10 +84,8 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     let one = |reference: &String| make(prior.as_ref(), &trials, options(reference));
     let made: Result<Vec<Made>, _> = references.iter().map(one).collect();
-    let mut made = made.map_err(of_trials)?;
-    made.first_mut()
-        .into_iter()
-        .for_each(|made| made.notes.extend(copied_signals(&trials, &signals)));
+    let made = made.map_err(of_trials)?;
+    copied_signals(&trials, &signals).iter().for_each(doubt);
     let mut outputs = Outputs::default();
     let records: Vec<PathBuf> = match &references[..] {
         [_] => vec![args.out.clone()],

@@ -24,7 +24,7 @@ use super::{
     evaluate::table_of_errors,
     json::Json,
     reading::column,
-    shared::{or_force, say, say_first, spinner, tell, write_text},
+    shared::{doubt, or_force, say, say_first, spinner, tell, write_text},
     simulate,
 };
 use crate::display::{is_quiet, is_verbose};
@@ -175,7 +175,9 @@ fn write(out: &Path, title: String, sessions: &Sessions, job: &Job) -> anyhow::R
         ));
     }
     notes.push(format!("{}; {}", calibrations.choice.why, MODELS_IN_WORDS));
-    notes.extend(calibrations.surfaces.notes.iter().chain(&calibrations.choice.notes).cloned());
+    let surfaces = &calibrations.surfaces;
+    let remarks = surfaces.doubts.iter().chain(&surfaces.notes);
+    notes.extend(remarks.chain(&calibrations.choice.notes).cloned());
     let context = Context {
         title,
         calibrated_on: names(&sessions.fit),
@@ -297,6 +299,7 @@ fn trials(count: usize) -> String {
 /// Prints the result, and with `-v` the details.
 fn print(sessions: &Sessions, job: &Job, result: &str) -> anyhow::Result<()> {
     let Calibrations { surfaces, choice, evaluation, kinds, .. } = &job.calibrations;
+    surfaces.doubts.iter().for_each(doubt);
     say_first(result)?;
     if is_quiet() {
         return Ok(());

@@ -22,7 +22,9 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use stretch_data::files::{FileError, Outputs};
 
 use crate::display::shows_progress;
-pub(crate) use crate::display::{detail, give_stdout, say, say_as_is, say_below, say_first, tell};
+pub(crate) use crate::display::{
+    detail, doubt, give_stdout, say, say_as_is, say_below, say_first, tell,
+};
 
 /// A parser of values that a shell completes with `names`, although it accepts further values.
 #[derive(Clone)]

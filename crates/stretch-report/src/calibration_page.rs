@@ -107,7 +107,7 @@ pub fn calibration_report(
         notes: choice
             .map(|choice| format!("{}; {MODELS_IN_WORDS}", choice.why))
             .into_iter()
-            .chain(calibrated.notes.clone())
+            .chain(remarks(calibrated).cloned())
             .collect(),
         kinds: Vec::new(),
     };
@@ -399,6 +399,11 @@ fn surfaces(page: &mut Page, calibrated: &[(&str, &Calibrated)]) {
     }
 }
 
+/// What is remarked on a calibration, the doubts first.
+fn remarks(calibrated: &Calibrated) -> impl Iterator<Item = &String> {
+    calibrated.doubts.iter().chain(&calibrated.notes)
+}
+
 fn fits(page: &mut Page, calibrated: &[(&str, &Calibrated)], context: &Context) {
     page.section("What was fitted", "");
     if !context.signal_choice.is_empty() {
@@ -409,7 +414,7 @@ fn fits(page: &mut Page, calibrated: &[(&str, &Calibrated)], context: &Context) 
         page.table(&signal_table(&context.signal_choice));
     }
     for (name, calibrated) in calibrated {
-        let new = calibrated.notes.iter().filter(|note| !context.notes.contains(note));
+        let new = remarks(calibrated).filter(|note| !context.notes.contains(note));
         page.list(&new.cloned().collect::<Vec<_>>());
         page.folded(&format!("{name}: coefficients and orders"), |page| {
             for fit in &calibrated.fits {

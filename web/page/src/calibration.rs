@@ -127,6 +127,7 @@ impl Made {
             options.model = choice.model;
         }
         let mut calibrated = calibrate(&trials, &options)?;
+        notes.append(&mut calibrated.doubts);
         notes.append(&mut calibrated.notes);
         if let Some(why) = explains_nothing(&calibrated.fits) {
             return Err(Said(why));

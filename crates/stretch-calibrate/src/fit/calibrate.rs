@@ -24,7 +24,9 @@ pub struct Calibrated {
     pub calibration: Calibration,
     /// The report of the linear fit, or one report for each branch.
     pub fits: Vec<FitReport>,
-    /// Changes made to the data before the fit, and doubts about the data, one sentence each.
+    /// What may be wrong with the data or the fit, one sentence each.
+    pub doubts: Vec<String>,
+    /// Changes made to the data before the fit, and remarks on the fit, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -85,9 +87,10 @@ pub(crate) fn calibrate_with(
         }
     };
     notes.splice(0..0, prepared.notes.iter().cloned());
+    let doubts = prepared.doubts.clone();
     let provenance = provenance(&options.date, trials, [&options.signal, &options.reference]);
     let calibration = prepared.calibration(model, provenance)?;
-    Ok((Calibrated { calibration, fits, notes }, made))
+    Ok((Calibrated { calibration, fits, doubts, notes }, made))
 }
 
 /// Choices within a model with memory, such as its time constants. They are kept when the model is fitted again to

@@ -44,6 +44,9 @@ pub(crate) struct Prepared {
     pub signal_range: Range,
     pub target_range: Range,
     pub dead: DeadBands,
+    /// What may be wrong with the data, one sentence each.
+    pub doubts: Vec<String>,
+    /// Changes made to the data, one sentence each.
     pub notes: Vec<String>,
     pub options: Options,
     /// Name of the first trial.
@@ -61,7 +64,7 @@ impl Prepared {
         let (sample_rate, Evened { pieces, rows, mut notes, .. }) = Evened::of(trials, options)?;
         notes.extend(rows.note());
         let names: Vec<&str> = trials.iter().map(|trial| trial.name.as_str()).collect();
-        notes.extend(doubts(&names, &pieces, sample_rate.hz(), options));
+        let doubts = doubts(&names, &pieces, sample_rate.hz(), options);
         let target = target(options, &pieces)?;
         let pairs = pieces.iter().flat_map(|(_, [signal, reference, _])| {
             signal.iter().zip(reference).map(|(&v, &x)| (v, target.from_reference(x)))
@@ -101,6 +104,7 @@ impl Prepared {
             signal_range,
             target_range,
             dead,
+            doubts,
             notes,
             options,
             first_trial: trials[0].name.clone(),

@@ -38,7 +38,7 @@ fn a_log_at_another_rate_is_told_to_be_brought_onto_the_calibration_s() {
     let slow = scratch.write("slow.csv", own_trial("time_s,length_mm,bridge_v", 10.0));
     let mut evaluate = stretch();
     evaluate.args(["evaluate", "--calibration"]).arg(&record).arg(&slow);
-    let says = "it has 20.0000 samples a second, but the calibration needs 100: resample it (stretch convert --grid 100)";
+    let says = "it has 20 samples a second, but the calibration needs 100: resample it (stretch convert OLD --grid 100 --out NEW.csv)";
     fails(&mut evaluate, &["slow.csv: no sample has an estimate", says]);
     let even = scratch.path("even.csv");
     runs(stretch().arg("convert").arg(&slow).args(["--grid", "100", "--out"]).arg(&even));

@@ -113,7 +113,24 @@ fn times_of_milliseconds_are_asked_about() {
     slow.time_s.iter_mut().for_each(|t| *t = 1e3 * *t + 0.25);
     let notes = notes(&[slow]);
     assert!(notes.len() == 1, "{notes:?}");
-    assert!(notes[0].starts_with("the trials have 0.1000 samples a second"), "{notes:?}");
+    assert!(notes[0].starts_with("the trials have 0.1 samples a second"), "{notes:?}");
+}
+
+#[test]
+fn a_fit_to_a_few_samples_is_doubted() {
+    let mut short = trial(0);
+    let cut = |samples: usize, trial: &mut Trial| {
+        trial.time_s.truncate(samples);
+        trial.channels.iter_mut().for_each(|channel| channel.values.truncate(samples));
+    };
+    cut(50, &mut short);
+    assert_eq!(notes(&[short.clone()]), Vec::<String>::new());
+    cut(49, &mut short);
+    let notes = notes(&[short]);
+    assert!(
+        notes.len() == 1 && notes[0].starts_with("the trials have 49 samples in total"),
+        "{notes:?}"
+    );
 }
 
 #[test]

@@ -19,6 +19,16 @@ pub fn after_number(unit: &str) -> String {
     if unit == "1" || unit.is_empty() { String::new() } else { format!(" {unit}") }
 }
 
+/// Returns the command that resamples a recording to a rate in Hz, for advice in an error.
+///
+/// ```
+/// let command = stretch_data::resampling(100.000_001);
+/// assert_eq!(command, "stretch convert OLD --grid 100 --out NEW.csv");
+/// ```
+pub fn resampling(rate_hz: f64) -> String {
+    format!("stretch convert OLD --grid {} --out NEW.csv", in_digits(rate_hz, 6))
+}
+
 /// Writes a number with at most `digits` significant digits, without trailing zeros: in plain
 /// notation from 0.0001 to a million, otherwise with an exponent.
 ///

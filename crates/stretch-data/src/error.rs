@@ -3,7 +3,11 @@
 
 use std::{error::Error, fmt, fs, io, path::Path};
 
-use crate::{column::unit, files::FileError};
+use crate::{
+    column::unit,
+    digits::{in_digits, resampling},
+    files::FileError,
+};
 
 /// A place in a file.
 ///
@@ -86,7 +90,8 @@ pub enum DataError {
     },
     /// A trial whose sample rate differs from that of the rest of its session.
     #[error(
-        "{trial}, column time_s: it has {rate_hz:.2} samples per second, but the session has {usual_hz:.2}; resample it to that rate or leave it out"
+        "{trial}, column time_s: it has {} samples per second, but the session has {}; resample it ({}) or leave it out",
+        in_digits(*rate_hz, 6), in_digits(*usual_hz, 6), resampling(*usual_hz)
     )]
     OtherRate {
         /// The trial.
@@ -109,7 +114,7 @@ pub enum DataError {
     /// More rows than a command holds in memory.
     #[error(
         "the trials have {rows} rows in total, and at most {most} can be processed; resample them to a lower rate \
-         (stretch convert --grid HZ), or give a part of the recording"
+         (stretch convert OLD --grid HZ --out NEW.csv), or give a part of the recording"
     )]
     TooLong {
         /// Number of rows of all trials.
@@ -158,6 +163,9 @@ impl fmt::Display for Nearest<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             // A time column is renamed when it is read.
+            _ if self.1 == "time_s" => {
+                f.write_str(" among the signals and references (it holds the times of the samples)")
+            }
             _ if matches!(unit(self.1), Some("s" | "ms" | "us" | "ns"))
                 && self.2.iter().any(|name| name == "time_s") =>
             {
@@ -189,8 +197,8 @@ impl DataError {
                     many => format!("{many} CSV files"),
                 };
                 format!(
-                    "it contains {held}: list recordings one by one ({shown}/{first}, or {shown}/*.csv if several may be \
-                     given), or write a dataset.toml that states which are fitted and which are tests"
+                    "it contains {held}: give one of them ({shown}/{first}), or {shown}/*.csv to a command that takes several, or write a \
+                     dataset.toml that states which are fitted and which are tests"
                 )
             }
         };

@@ -19,7 +19,7 @@ mod write;
 
 pub use column::{Quantity, spelt_unit, unit, unit_of, written_unit};
 pub use data_set::{DataSet, Split, TrialEntry, TrialKind, digest_of, is_digest};
-pub use digits::{after_number, in_digits, significant};
+pub use digits::{after_number, in_digits, resampling, significant};
 pub use error::{DataError, Place, error_sentence, listed, nearest, rename_options, shown};
 pub use even::{Even, EvenPart, EvenSpec, Rows};
 pub use even_session::{EvenSession, EvenTrial, SessionTrial};

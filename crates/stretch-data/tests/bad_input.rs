@@ -64,7 +64,7 @@ fn data_sets_whose_files_are_missing() {
     let read = || DataSet::read(folder.path()).expect_err("not whole").to_string();
     assert!(read().ends_with("name a data set, or recordings one by one"), "{}", read());
     std::fs::write(folder.path().join("b.csv"), "time_s\n").expect("written");
-    assert!(read().contains("it contains b.csv: list recordings one by one ("), "{}", read());
+    assert!(read().contains("it contains b.csv: give one of them ("), "{}", read());
     std::fs::write(folder.path().join("dataset.toml"), SET).expect("written");
     assert!(read().ends_with("row 4, key trial[0].file: there is no file a.csv in the folder"));
     std::fs::write(folder.path().join("dataset.toml"), b"name = '\xff'").expect("written");

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use stretch_data::{Quantity, SessionTrial, Trial, ends, significant, toml_comment, unit};
+use stretch_data::{
+    Quantity, SessionTrial, Trial, ends, in_digits, significant, toml_comment, unit,
+};
 use stretch_gap::Noise;
 use stretch_recording::{ReadOptions, Recording};
 
@@ -302,8 +304,9 @@ fn trials_of(trials: &[(String, Trial)]) -> String {
     };
     for ((name, trial), is_tested) in trials.iter().zip(is_tested) {
         let split = if is_tested { "test" } else { "fit" };
-        let rate =
-            trial.rate_hz().map_or(String::new(), |hz| format!(", {hz:.4} samples a second"));
+        let rate = trial
+            .rate_hz()
+            .map_or(String::new(), |hz| format!(", {} samples a second", in_digits(hz, 6)));
         out +=
             &format!("\n[[trial]]\nfile = {}  # {:.2} s{rate}\n", quoted(name), trial.duration_s());
         out += &format!("split = {split:?}\n");

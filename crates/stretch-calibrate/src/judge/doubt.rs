@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::Serialize;
 use stretch_core::{Calibration, Range};
-use stretch_data::{Trial, out_of_order, rate_of};
+use stretch_data::{Trial, in_digits, out_of_order, rate_of, resampling};
 use stretch_receptor::{Domain, Reading, Withheld};
 
 use super::{
@@ -278,11 +278,12 @@ impl Pace {
         if (rate_hz / found_hz - 1.0).abs() <= PACE_TOLERANCE {
             return None;
         }
+        let [found, rate] = [found_hz, rate_hz].map(|hz| in_digits(hz, 6));
         let units = [(1e3, "ms"), (1e6, "us"), (1e9, "ns")];
         let is_near = |factor: f64| (rate_hz / found_hz / factor - 1.0).abs() <= PACE_TOLERANCE;
         if let Some((_, unit)) = units.into_iter().find(|(factor, _)| is_near(*factor)) {
             let text = format!(
-                "the log has {found_hz:.4} samples a second, the calibration {rate_hz:.4}: are its times in {unit}? Then read them with \
+                "the log has {found} samples a second, the calibration {rate}: are its times in {unit}? Then read them with \
                  --time COL:{unit}, where COL is the time column"
             );
             return Some(Doubt::new("other_rate", text));
@@ -295,8 +296,8 @@ impl Pace {
             "the samples that the log lacks count as missing"
         };
         let text = format!(
-            "the log has {found_hz:.4} samples a second, the calibration {rate_hz:.4}: {what}; log at that rate, or resample \
-             the log with stretch convert --grid {rate_hz}"
+            "the log has {found} samples a second, the calibration {rate}: {what}; log at that rate, or resample the log ({})",
+            resampling(rate_hz)
         );
         Some(Doubt::new("other_rate", text))
     }

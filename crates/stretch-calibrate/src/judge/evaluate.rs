@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 use stretch_core::{Calibration, Polarity};
-use stretch_data::{Trial, check_rows, unit_of};
+use stretch_data::{Trial, check_rows, in_digits, resampling, unit_of};
 use stretch_metrics::{Agreement, Delta, PairedBlocks, PairedT, TTest, lag};
 
 use crate::{
@@ -252,7 +252,9 @@ pub fn evaluate_methods(
 fn nothing_estimated(trial: &Trial, rate_hz: f64, expected_hz: f64) -> CalibrateError {
     let why = match (expected_hz / rate_hz - 1.0).abs() > PACE_TOLERANCE {
         true => format!(
-            "it has {rate_hz:.4} samples a second, but the calibration needs {expected_hz}: resample it (stretch convert --grid {expected_hz})"
+            "it has {} samples a second, but the calibration needs {expected_hz}: resample it ({})",
+            in_digits(rate_hz, 6),
+            resampling(expected_hz)
         ),
         false => {
             "it is shorter than the warm-up of the rate estimator: use a longer trial".to_owned()

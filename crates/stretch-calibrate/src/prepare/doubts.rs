@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use rayon::prelude::*;
-use stretch_data::Trial;
+use stretch_data::{Trial, in_digits};
 
 use crate::Options;
 
@@ -22,7 +22,7 @@ const STANDS: usize = 5;
 const MOVES_ON: f64 = 0.1;
 /// Rates below this limit, Hz, are probably due to time stamps in milliseconds.
 const SLOW_HZ: f64 = 0.5;
-/// Smallest number of samples at which a low rate is attributed to a wrong unit of time.
+/// Smallest number of samples of a fit without a doubt, and at which a low rate is attributed to a wrong unit of time.
 const TELLING: usize = 50;
 
 /// Greatest number of trials with which each trial is compared. If there are more, they are chosen evenly.
@@ -299,8 +299,14 @@ pub(super) fn doubts(
     let samples = pieces.iter().map(|(_, [signal, ..])| signal.len()).sum::<usize>();
     if rate_hz < SLOW_HZ && samples >= TELLING && !options.is_table {
         said.push(format!(
-            "the trials have {rate_hz:.4} samples a second: are their times in milliseconds? If so, convert them to seconds (in the program \
-             with --time COL:ms, where COL is the time column), which makes the rates 1000 times as high"
+            "the trials have {} samples a second: are their times in milliseconds? If so, convert them to seconds (in the program with \
+             --time COL:ms, where COL is the time column), which makes the rates 1000 times as high",
+            in_digits(rate_hz, 6)
+        ));
+    }
+    if samples < TELLING && !options.is_table {
+        said.push(format!(
+            "the trials have {samples} samples in total: a fit to so few says little about other motion; record half a minute over the whole range"
         ));
     }
     let all = Line::of(pieces.iter()).spreads[1];

@@ -4,7 +4,7 @@ use stretch_core::{
     Calibration, CalibrationSpec, DesignError, FitSummary, Interval, Label, Model, Normalisation,
     Polarity, Provenance, Range, RangeSpec, RateEstimator, SampleRate, Schema, Target,
 };
-use stretch_data::{Even, EvenSpec, Rows, Trial, check_rows};
+use stretch_data::{Even, EvenSpec, Rows, Trial, check_rows, in_digits, resampling};
 use stretch_filter::RateFilter;
 
 use crate::{CalibrateError, ModelKind, Options, PRESSURE};
@@ -254,9 +254,11 @@ pub fn check_rate(
         return Ok(());
     }
     Err(CalibrateError::Refused(format!(
-        "{} was sampled at {rate_hz:.4} Hz and {first} at {first_hz:.4} Hz; resample one of them (stretch convert --grid {first_hz:.4}), or \
-         calibrate them separately",
-        trial.name
+        "{} was sampled at {} Hz and {first} at {} Hz; resample one of them ({}), or calibrate them separately",
+        trial.name,
+        in_digits(rate_hz, 6),
+        in_digits(first_hz, 6),
+        resampling(first_hz)
     )))
 }
 

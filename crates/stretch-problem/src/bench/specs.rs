@@ -1,5 +1,6 @@
 //! Converts effects of the catalogue into effects for the diagnosis.
 
+use stretch_data::in_digits;
 use stretch_gap::{Description, EffectSpec};
 use stretch_sim::{Effect, EffectParameter, Search};
 
@@ -45,8 +46,9 @@ pub(crate) fn skew_of(about: &Description, usual: [f64; 2]) -> [f64; 2] {
 /// A note on an effect that a sample rate (Hz) cannot show, because it needs another one.
 pub(crate) fn too_slow(name: &str, rate_hz: f64, needed_hz: f64) -> String {
     format!(
-        "{name} is not looked for, because at {rate_hz:.4} samples a second it cannot be distinguished from other causes; record at \
-         least {needed_hz} samples a second"
+        "{name} is not looked for, because at {} samples a second it cannot be distinguished from other causes; record at \
+         least {needed_hz} samples a second",
+        in_digits(rate_hz, 6)
     )
 }
 

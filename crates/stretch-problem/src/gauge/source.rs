@@ -80,7 +80,7 @@ fn columns_of<'a>(
             Err(ProblemError::too_little(
                 format!("{own} is a gauge alone, but its reference and its signal are not known"),
                 format!(
-                    "name their columns with --reference and --signal; the columns are {names}"
+                    "name their columns with stretch diagnose --reference and --signal; the columns are {names}"
                 ),
             ))
         }

@@ -7,7 +7,7 @@ use stretch_calibrate::{
     toolkit::{LinearFactor, extent},
 };
 use stretch_core::{Interval, Normalisation, Range, RangeSpec, Target};
-use stretch_data::{listed, unit_of};
+use stretch_data::{in_digits, listed, resampling, unit_of};
 
 use crate::{
     SleeveError,
@@ -350,8 +350,11 @@ fn differs(session: &Session, first: &Session) -> Option<String> {
     }
     if (session.sample_rate_hz / first.sample_rate_hz - 1.0).abs() > 0.05 {
         return Some(format!(
-            "it was sampled at {:.4} Hz and {} at {:.4} Hz: resample its recording (stretch convert --grid {}) and write it again",
-            session.sample_rate_hz, first.name, first.sample_rate_hz, first.sample_rate_hz
+            "it was sampled at {} Hz and {} at {} Hz: resample its recording ({}) and write it again",
+            in_digits(session.sample_rate_hz, 6),
+            first.name,
+            in_digits(first.sample_rate_hz, 6),
+            resampling(first.sample_rate_hz)
         ));
     }
     let span = |of: &Interval| of.max - of.min;

@@ -6,7 +6,7 @@ use stretch_calibrate::{
     CalibrateError,
     toolkit::{RowAccumulator, extent, provenance},
 };
-use stretch_data::{Trial, unit_of};
+use stretch_data::{Trial, in_digits, resampling, unit_of};
 
 use crate::{
     SleeveError, SleeveFit, SleeveOptions,
@@ -262,8 +262,10 @@ impl Prior {
         let hz = channels.sample_rate.hz();
         if (hz / self.sample_rate_hz - 1.0).abs() > 0.05 {
             return refused(format!(
-                "it has {:.4} samples a second and the data {hz:.4}: resample the data (stretch convert --grid {})",
-                self.sample_rate_hz, self.sample_rate_hz
+                "it has {} samples a second and the data {}: resample the data ({})",
+                in_digits(self.sample_rate_hz, 6),
+                in_digits(hz, 6),
+                resampling(self.sample_rate_hz)
             ));
         }
         for (k, name) in self.signals.iter().enumerate() {

@@ -146,8 +146,8 @@ fn summarise(seen: &Seen, faults: Faults) {
     let at_least = if faults.missing >= u64::from(u32::MAX) - 1 { "at least " } else { "" };
     let Seen { samples, withheld, limited, clamped, .. } = seen;
     warn(format!(
-        "{samples} samples: {withheld} without an estimate, {limited} with a clamped signal or rate ({clamped} outside the calibrated domain); time stamps: {at_least}{} missing, {} early \
-         or late",
+        "{samples} samples: {withheld} without an estimate, {limited} limited to the ends of the calibrated curve, {clamped} of them outside the calibrated domain; \
+         time stamps: {at_least}{} missing, {} early or late",
         faults.missing, faults.jittered,
     ));
 }

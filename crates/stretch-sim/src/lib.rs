@@ -23,7 +23,7 @@ pub use stages::{
     Actuation, Bridge, Chain, ChainMemory, Held, Memory, Muscle, Openings, Pneumatics, Recorded,
     Reference, Sensing, Setting,
 };
-pub use static_law::StaticLaw;
+pub use static_law::{StaticLaw, static_kpa};
 pub use stretch_effects::{
     Action, Acts, Alone, Cell, Constant, DEFAULT_STEP_S, Droop, Effect, EffectParameter, Extent,
     Find, Form, Grid, GridError, Language, Law, Line, Live, Measured, Need, Operator, Place,

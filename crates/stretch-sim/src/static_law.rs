@@ -22,15 +22,8 @@ pub struct StaticLaw {
 impl StaticLaw {
     /// Solves the law for a rig.
     pub fn new(params: &RigParams) -> Self {
-        let [a0, a1, a3] = [params[Key::A0], params[Key::A1], params[Key::A3]];
         let k_max = params[Key::KMax];
-        // Pressure and its slope at x.
-        let law = |x: f64| {
-            let gone = libm::exp(-a1 * x);
-            let stiff = a0 * libm::exp(a3 * x * x);
-            let u = stiff * (1.0 - gone);
-            (u, stiff * a1 * gone + 2.0 * a3 * x * u)
-        };
+        let law = |x: f64| relative_pressure(params, x);
         let h = 1.0 / DENSITY as f64;
         let span = (1.5 * (params[Key::PS] / params[Key::PRef]).max(1.0)).clamp(1.0, MOST);
         let count = (span * DENSITY as f64).ceil() as usize;
@@ -75,6 +68,30 @@ impl StaticLaw {
             None => self.last,
         }
     }
+}
+
+/// Pressure, relative to the reference pressure, at the relative contraction x, and its slope.
+fn relative_pressure(params: &RigParams, x: f64) -> (f64, f64) {
+    let [a0, a1, a3] = [params[Key::A0], params[Key::A1], params[Key::A3]];
+    let gone = libm::exp(-a1 * x);
+    let stiff = a0 * libm::exp(a3 * x * x);
+    let u = stiff * (1.0 - gone);
+    (u, stiff * a1 * gone + 2.0 * a3 * x * u)
+}
+
+/// Gauge pressure, kPa, at which a muscle without a load rests at a length, mm: the inverse of [`StaticLaw`]. It is 0 for
+/// a muscle that is longer than at rest.
+///
+/// ```
+/// use stretch_sim::{Key, RigParams, StaticLaw, static_kpa};
+/// let params = RigParams::default();
+/// let length_mm = params[Key::L0] * (1.0 - StaticLaw::new(&params).contraction(400.0));
+/// approx::assert_abs_diff_eq!(static_kpa(&params, length_mm), 400.0, epsilon = 1e-3);
+/// assert_eq!(static_kpa(&params, params[Key::L0] + 1.0), 0.0);
+/// ```
+pub fn static_kpa(params: &RigParams, length_mm: f64) -> f64 {
+    let x = (1.0 - length_mm / params[Key::L0]) / params[Key::KMax];
+    (1e-3 * params[Key::PRef] * relative_pressure(params, x).0).max(0.0)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::{borrow::Cow, sync::Arc};
 use stretch_gap::Run;
 use stretch_sim::{
     Actuation, DEFAULT_STEP_S, EffectSet, Grid, Key, Memory, Muscle, Need, Openings, Pneumatics,
-    Reference, RigParams, RigStage, Sensing, Start,
+    Reference, RigParams, RigStage, Sensing, Start, static_kpa,
 };
 
 use super::{RigSimulator, nominal::TunedRig, session::Begin, timing};
@@ -194,21 +194,15 @@ impl Setting<'_> {
             Begin::Empty => EMPTY_KPA.0 + self.tuned.offset * EMPTY_KPA.1,
             Begin::Full => supply * (1.0 - FULL_SHARE.0 + self.tuned.offset * FULL_SHARE.1),
             Begin::Pressure(kpa, sd) => kpa + self.tuned.offset * sd,
-            Begin::Length(mm) => self.static_kpa(mm) + LENGTH_KPA * self.tuned.offset,
+            Begin::Length(mm) => {
+                static_kpa(&self.tuned.params, mm) + LENGTH_KPA * self.tuned.offset
+            }
             // The muscle lags behind its pressure: tau L' = L_static - L.
             Begin::Moving(mm, mm_per_s) => {
                 let ahead = mm + self.tuned.params[Key::TauM] * mm_per_s;
-                self.static_kpa(ahead) + MOVING_KPA * self.tuned.offset
+                static_kpa(&self.tuned.params, ahead) + MOVING_KPA * self.tuned.offset
             }
         }
-    }
-
-    /// Pressure at which the muscle rests at a length, kPa.
-    fn static_kpa(&self, mm: f64) -> f64 {
-        let p = &self.tuned.params;
-        let x = (1.0 - mm / p[Key::L0]) / p[Key::KMax];
-        let law = p[Key::A0] * (1.0 - (-p[Key::A1] * x).exp()) * (p[Key::A3] * x * x).exp();
-        (1e-3 * p[Key::PRef] * law).max(0.0)
     }
 
     /// Inlet and outlet, with commands that act ahead of their rows.

@@ -20,7 +20,7 @@ use std::{
 use anstream::{AutoStream, ColorChoice, stream::RawStream};
 use anyhow::ensure;
 use clap::builder::styling::{AnsiColor, Style};
-use stretch_core::is_hidden;
+use stretch_core::label::is_hidden;
 use stretch_data::files::is_standard_output;
 use terminal_size::{Width, terminal_size};
 use textwrap::{Options, WordSeparator, WordSplitter, WrapAlgorithm};

@@ -12,7 +12,7 @@ pub mod fixed;
 mod folded;
 mod history;
 mod interval;
-mod label;
+pub mod label;
 mod model;
 mod observer;
 mod polarity;
@@ -31,7 +31,6 @@ pub mod strategies;
 mod surface;
 mod unit;
 mod values;
-mod visible;
 
 pub use branch::Branch;
 pub use calibration::{
@@ -58,4 +57,3 @@ pub use stage::{Design, Runner, Stage};
 pub use surface::{Poly13, Surface};
 pub use unit::{Hertz, Millimetres, MillimetresPerSecond, SampleRate, Seconds, Volts};
 pub use values::Values;
-pub use visible::is_hidden;

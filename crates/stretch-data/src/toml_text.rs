@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, mem};
 
 use serde::Serialize;
-use stretch_core::is_hidden;
+use stretch_core::label::is_hidden;
 use toml_edit::{Item, Table};
 
 /// Comments for the entries of a rig file or a problem file.

@@ -8,7 +8,7 @@ use alloc::{
 };
 use core::fmt::Write;
 
-use stretch_core::is_hidden;
+use stretch_core::label::is_hidden;
 
 use crate::sketch::{Cell, Quantity, Sketch};
 

@@ -72,7 +72,7 @@ fn no_name_becomes_code_in_any_language() {
                 // The function has another name.
                 let expected = expected.replace("mm", &own);
                 assert_eq!(found, expected, "{name:?} in {}:\n{code}", language.name());
-                let is_seen = |c: char| c == '\n' || !stretch_core::is_hidden(c);
+                let is_seen = |c: char| c == '\n' || !stretch_core::label::is_hidden(c);
                 assert!(code.chars().all(is_seen), "{name:?}:\n{code}");
                 let is_coding = |line: &str| line.contains("coding:") || line.contains("coding=");
                 assert!(language != Language::Python || !code.lines().take(2).any(is_coding));

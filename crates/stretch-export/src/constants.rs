@@ -2,7 +2,7 @@
 
 use std::fmt::{Display, Write};
 
-use stretch_core::is_hidden;
+use stretch_core::label::is_hidden;
 
 /// A number that can be written as a literal in C99 and in C++11.
 pub(crate) trait Literal {

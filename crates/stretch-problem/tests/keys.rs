@@ -327,7 +327,7 @@ fn no_name_ends_a_text_or_a_comment() {
         assert_eq!(read.as_ref().ok(), Some(&spec), "{name:?}: {read:?}\n{written}");
         let comments = written.lines().filter_map(|line| line.split_once("# ").map(|(_, c)| c));
         let is_comment = |line: &&str| line.starts_with("0.4") || !line.contains('"');
-        let hidden = |line: &str| line.contains(stretch_core::is_hidden);
+        let hidden = |line: &str| line.contains(stretch_core::label::is_hidden);
         assert!(!comments.filter(is_comment).any(hidden), "{name:?}\n{written}");
     }
 }

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 use serde::Serialize;
-use stretch_core::is_hidden;
+use stretch_core::label::is_hidden;
 
 use super::{canvas::STEPS, thin::extent, time_figure::TimePlot};
 

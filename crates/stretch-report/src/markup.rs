@@ -1,6 +1,6 @@
 //! Text and numbers as they are written on a page.
 
-use stretch_core::is_hidden;
+use stretch_core::label::is_hidden;
 
 /// Text that is safe between tags and in double quotes, and well-formed in XML.
 ///

@@ -1,6 +1,6 @@
 //! Decodes frames from a byte stream that may be damaged.
 
-use crate::{Frame, frame::Refused, recent::Recent};
+use crate::{Answer, Frame, frame::Refused};
 
 /// The result of a byte that completes or breaks off a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -212,5 +212,39 @@ impl Decoder {
         self.counts.frames += 1;
         self.last = Some(frame);
         event
+    }
+}
+
+/// A ring buffer of the most recent frames.
+#[derive(Debug, Clone)]
+struct Recent {
+    frames: [Frame; Self::MOST],
+    next: usize,
+    known: usize,
+}
+
+impl Recent {
+    /// Number of stored frames: as many frames of 24 bytes as fit in 4096 bytes, the block that a
+    /// host reads at once. Only a frame in which all numbers have one digit is shorter than 24
+    /// bytes (`$S1,0,0,0,,W,*00000000` and the newline).
+    const MOST: usize = 4096 / 24;
+
+    const fn new() -> Self {
+        let none = Frame { counter: 0, time_ms: 0, code: 0, answer: Answer::Missing };
+        Self { frames: [none; Self::MOST], next: 0, known: 0 }
+    }
+
+    fn push(&mut self, frame: Frame) {
+        self.frames[self.next] = frame;
+        self.next = (self.next + 1) % Self::MOST;
+        self.known = (self.known + 1).min(Self::MOST);
+    }
+
+    fn has(&self, frame: &Frame) -> bool {
+        self.frames[..self.known].contains(frame)
+    }
+
+    fn forget(&mut self) {
+        (self.next, self.known) = (0, 0);
     }
 }

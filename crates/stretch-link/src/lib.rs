@@ -5,7 +5,6 @@
 mod clock;
 mod decoder;
 mod frame;
-mod recent;
 mod text;
 
 pub use clock::TimeLine;

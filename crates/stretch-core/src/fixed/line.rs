@@ -1,6 +1,9 @@
 //! A straight line in fixed point.
 
-use super::{accumulator::Accumulator, convert::from_f64, horner::check_horner};
+use super::{
+    accumulator::{Accumulator, check_horner},
+    from_f64,
+};
 use crate::DesignError;
 
 /// A line `intercept + slope v` over an input `v = volts / 2^32` in -1/2..1/2. `volts` may be any

@@ -1,6 +1,9 @@
 //! The surface of the published method ("the paper") in fixed point.
 
-use super::{accumulator::Accumulator, convert::from_f64, horner::check_horner};
+use super::{
+    accumulator::{Accumulator, check_horner},
+    from_f64,
+};
 use crate::{DesignError, Poly13};
 
 /// A [`Poly13`] over two inputs in -1/2..1/2. The integers `rate` and `volts` may be any `i32`.

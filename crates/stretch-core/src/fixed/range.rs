@@ -1,6 +1,6 @@
 //! Normalisation in fixed point.
 
-use super::convert::{from_f64, saturate};
+use super::{from_f64, saturate};
 use crate::{DesignError, Range};
 
 /// The affine relation between a channel's integers and its unit: `zero + step x`.

@@ -21,7 +21,6 @@ mod code_record;
 mod fold;
 mod observer;
 mod observer_numbers;
-mod reading;
 mod receptor;
 mod scaled;
 
@@ -30,6 +29,5 @@ pub use calibration::{CODE_SCHEMA, FixedCalibration, FixedNumbers};
 pub use code_map::{CodeMap, CodeSurface, Span};
 pub use observer::{FixedObserver, IntegerMemory, IntegerObserver};
 pub use observer_numbers::{ObserverNumbers, RestNumbers};
-pub use reading::CodeReading;
-pub use receptor::{CodeMemory, CodeSurfaces, FixedReceptor, SideBit};
+pub use receptor::{CodeMemory, CodeReading, CodeSurfaces, FixedReceptor, SideBit};
 pub use scaled::Scaled;

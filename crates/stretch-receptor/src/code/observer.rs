@@ -8,7 +8,7 @@ use stretch_core::{
 use super::{
     adc::{Adc, AdcCode},
     observer_numbers::{KNOTS, ObserverNumbers, PLACE_BITS, SHARE_BITS, TARGET_BITS, WEIGHT_BITS},
-    reading::CodeReading,
+    receptor::CodeReading,
 };
 use crate::{Domain, Front, ReceptorError, front::Live, gains::SLOPES};
 

@@ -3,14 +3,24 @@
 use stretch_core::{Branch, Design, Stage};
 use stretch_filter::{FixedSgMemory, FixedSgRate};
 
-use super::{
-    adc::AdcCode, calibration::FixedCalibration, code_map::CodeMap, reading::CodeReading,
-    scaled::FixedMap,
-};
+use super::{adc::AdcCode, calibration::FixedCalibration, code_map::CodeMap, scaled::FixedMap};
 use crate::{
-    Front,
+    Domain, Front,
     front::{Live, Side},
 };
+
+/// The answer of a [`FixedReceptor`] for one sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct CodeReading<E> {
+    /// The estimated reference: an integer in thousandths of the reference's unit (micrometres for a reference in
+    /// millimetres), a float in that unit.
+    pub estimate: E,
+    /// The branch that was evaluated.
+    pub branch: Branch,
+    /// Whether the inputs lay in the calibrated domain.
+    pub domain: Domain,
+}
 
 /// A stretch receptor for converter codes, in 32-bit fixed point. Estimates are thousandths of the reference's unit.
 ///

@@ -218,7 +218,8 @@ impl<'a> Search<'a> {
         Ok(best)
     }
 
-    /// Returns a set with one more effect; `None` if no effect meets the acceptance criteria.
+    /// Returns the set with one more effect that has the highest score of those that meet the acceptance criteria; `None`
+    /// if none does.
     fn extended(
         &mut self,
         best: &Hypothesis,
@@ -230,27 +231,19 @@ impl<'a> Search<'a> {
         let looked = self.look(best)?;
         let Looked { ground, screened } = &*looked;
         let kept = if best.effects.is_empty() { KEPT } else { KEPT_LATER };
-        let deviating = self.acceptance.deviating(best)?;
         let list = self.shortlist(best, screened, kept);
-        if !list.is_empty() {
-            progress(&format!("fitting effects, round {round}: {}", list.len()));
+        if list.is_empty() {
+            return Ok(None);
         }
-        self.first_accepted((best, &deviating), ground, &list)
-    }
-
-    /// Returns the extension of `base` with the highest score that meets the acceptance criteria.
-    /// `base` is a set, without and with deviations.
-    /// The extension with the highest score of all may fail them, if it only explains the model
-    /// discrepancy of other effects.
-    fn first_accepted(
-        &mut self,
-        base: (&Hypothesis, &Hypothesis),
-        ground: &Ground,
-        list: &[Screened],
-    ) -> Result<Option<Hypothesis>, GapError> {
-        let found = self.sets.extend_all(base.0, ground, list, base.0.score)?;
+        progress(&format!("fitting effects, round {round}: {}", list.len()));
+        let found = self.sets.extend_all(best, ground, &list, best.score)?;
+        if found.is_empty() {
+            return Ok(None);
+        }
+        // The extension with the highest score may fail, if it only explains the model discrepancy of other effects.
+        let deviating = self.acceptance.deviating(best)?;
         for next in found {
-            if self.acceptance.is_accepted(base, &next)? {
+            if self.acceptance.is_accepted((best, &deviating), &next)? {
                 return Ok(Some(next));
             }
         }

@@ -98,9 +98,14 @@ pub(crate) fn instead(error: &clap::Error) -> Option<String> {
     };
     let Some(ContextValue::String(name)) = error.get(kind) else { return None };
     if name.ends_with(".csv") && error.kind() == ErrorKind::UnknownArgument {
-        return Some(format!(
-            "{name}: one file was already named; name the calibration with --calibration cal.json"
-        ));
+        let usage = error.get(ContextKind::Usage).map(ToString::to_string).unwrap_or_default();
+        let instead = match usage.contains("diagnose") {
+            true => {
+                "put recordings that belong together into a folder with a dataset.toml, and give the folder"
+            }
+            false => "name the calibration with --calibration cal.json",
+        };
+        return Some(format!("{name}: one file was already named; {instead}"));
     }
     let name = name.split(['=', ' ']).next()?;
     let (_, instead) = table.iter().find(|(old, _)| *old == name)?;
@@ -129,6 +134,9 @@ mod tests {
         let asked = ["stretch", "apply", "--calibration", "a.json", "b.csv", "c.csv"];
         let error = command().try_get_matches_from(asked).unwrap_err();
         assert!(instead(&error).is_some_and(|text| text.contains("--calibration")), "{error}");
+        let asked = ["stretch", "diagnose", "a.csv", "b.csv"];
+        let error = command().try_get_matches_from(asked).unwrap_err();
+        assert!(instead(&error).is_some_and(|text| text.contains("dataset.toml")), "{error}");
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::{
     time::Duration,
 };
 
-use crate::support::{Scratch, calibrate, one_line, program, runs, stdout, stretch};
+use crate::support::{Scratch, calibrate, one_line, program, runs, stdout, stretch, warned};
 use serde_json::Value;
 
 #[test]
@@ -110,8 +110,10 @@ fn other_columns_and_units() {
     assert_eq!(summary["signal"], "s2", "the other is noise");
     let mut worse = calibrate(&trial, &scratch.path("worse.json"));
     worse.args(["--time", "t_ms", "--reference", "angle_deg", "--signal", "auto:s2,s1"]);
-    let said = one_line(&runs(worse.args(["--model", "poly10", "--force"])));
-    assert!(said.contains("note: poly10 is worse than a straight line"), "{said}");
+    worse.args(["--model", "poly10", "--force"]);
+    let doubt = one_line(&warned(&mut worse));
+    assert!(doubt.contains("poly10 is worse than a straight line"), "{doubt}");
+    let said = one_line(&runs(&mut worse));
     assert!(said.contains("RMSE of the signals, % of range: s"), "{said}");
     let output = stretch()
         .args(["apply", "--time", "t_ms", "--calibration"])

@@ -2,7 +2,7 @@
 
 use std::{fmt::Write, fs};
 
-use crate::support::{Scratch, calibrate, fails, runs, stretch};
+use crate::support::{Scratch, calibrate, fails, runs, stretch, warned};
 use testkit::random::unit;
 
 /// Writes a trial whose rows are changed depending on their numbers.
@@ -31,7 +31,7 @@ fn wild_values_are_counted_told_and_left_out() {
                 cells[column] = value.to_owned();
             }
         });
-        let told = runs(&mut calibrate(&log, &out));
+        let told = warned(&mut calibrate(&log, &out));
         assert!(told.contains("80 of 4000 values of"), "{value}: {told}");
         assert!(told.contains("are gross errors") && told.contains(value), "{told}");
         let whole = scratch.path("whole.csv");
@@ -70,7 +70,7 @@ fn a_fit_that_explains_nothing_is_refused_and_written_when_forced() {
             fails(&mut command, &parts);
             assert!(!out.exists() && !scratch.path("r.html").exists(), "{model}");
         }
-        let told = runs(calibrate(&log, &out).args(["--force", "--model", models[0]]));
+        let told = warned(calibrate(&log, &out).args(["--force", "--model", models[0]]));
         assert!(told.contains("explains nothing") && told.contains("--force"), "{told}");
         fs::remove_file(&out).unwrap();
     }

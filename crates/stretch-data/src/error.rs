@@ -163,7 +163,7 @@ impl fmt::Display for Nearest<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
             // A time column is renamed when it is read.
-            _ if self.1 == "time_s" => {
+            _ if self.1 == "time_s" && self.2.iter().any(|name| name == "time_s") => {
                 f.write_str(" among the signals and references (it holds the times of the samples)")
             }
             _ if matches!(unit(self.1), Some("s" | "ms" | "us" | "ns"))

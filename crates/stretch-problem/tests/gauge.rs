@@ -450,7 +450,8 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
     };
     refused(&short, "rod_mm", "s1", &["to fit have 188 samples", "300"]);
     let noted = |g: Result<GaugeSimulator, ProblemError>, words: &[&str]| {
-        let notes = g.expect("a gauge").notes().join("; ");
+        let gauge = g.expect("a gauge");
+        let notes = [gauge.notes(), gauge.doubts()].concat().join("; ");
         assert!(words.iter().all(|w| notes.contains(w)), "{notes}");
     };
     noted(gauge(&|_| (), "s1", "rod_mm"), &["s1 is noisier than rod_mm", "swapped"]);
@@ -458,7 +459,8 @@ fn columns_that_cannot_be_what_they_say_are_refused_or_told() {
     noted(gauge(&metres, "rod_mm", "s1"), &["rod_mm", "metres"]);
     let clipped = |t: &mut Trial| values(t, 1, &|_, y| y.max(-0.2));
     noted(gauge(&clipped, "rod_mm", "s1"), &["s1 is at -0.2, its least value", "lost"]);
-    assert!(gauge(&|_| (), "rod_mm", "s1").expect("a gauge").notes().is_empty());
+    let sound = gauge(&|_| (), "rod_mm", "s1").expect("a gauge");
+    assert!(sound.notes().is_empty() && sound.doubts().is_empty());
 }
 
 #[test]

@@ -37,10 +37,9 @@ impl Doubt {
         Self { code, text }
     }
 
-    /// Whether this doubt explains every other one: the signal is in another unit or from another sensor, or the sensor is
-    /// not connected.
+    /// Whether this doubt explains every other one: the signal is in another unit, or the sensor is not connected.
     pub fn explains_others(&self) -> bool {
-        matches!(self.code, "other_unit" | "other_sensor" | "constant_signal")
+        matches!(self.code, "other_unit" | "constant_signal")
     }
 
     /// Returns doubts about a method of an evaluation, by its place in it: trials whose reference is in another unit or
@@ -228,7 +227,10 @@ pub fn evaluation_doubts(
         let said = Doubt::of_method(evaluation, method, fit_rmse, spec.reference.as_str());
         let outside = outside(&reach, errors.clamped, errors.samples);
         match outside {
-            Some(cause) if cause.explains_others() => all.push(cause.of(name)),
+            // Estimates from the ends of the range say nothing about the errors.
+            Some(cause) if cause.explains_others() || cause.code == "other_sensor" => {
+                all.push(cause.of(name));
+            }
             // A shift comes first, because it also puts samples outside the range.
             outside => all.extend(said.into_iter().chain(outside).map(|doubt| doubt.of(name))),
         }

@@ -114,7 +114,9 @@ pub struct Even {
     pub rows: Rows,
     /// For each column that was unwrapped, the size of a turn in the column's unit.
     pub turns: Vec<Option<f64>>,
-    /// Notes: gaps, parts left out, uneven time stamps, wrapped angles. Empty if nothing had to be
+    /// Sentences about time without samples, at which the trial is parted.
+    pub gaps: Vec<String>,
+    /// Notes: parts left out, uneven time stamps, wrapped angles. Empty if nothing had to be
     /// changed.
     pub notes: Vec<String>,
 }
@@ -242,12 +244,12 @@ impl Even {
         let name = &trial.name;
         match &gaps[..] {
             [] => {}
-            [(_, first_s), ..] if gaps.len() > TOLD => self.notes.push(format!(
+            [(_, first_s), ..] if gaps.len() > TOLD => self.gaps.push(format!(
                 "{name}: {:.3} s are missing in {} gaps, the first after {first_s:.2} s; each part between gaps is treated as a separate trial",
                 gaps.iter().map(|(lost_s, _)| lost_s).sum::<f64>(),
                 gaps.len()
             )),
-            _ => self.notes.extend(gaps.iter().map(|(lost_s, at_s)| {
+            _ => self.gaps.extend(gaps.iter().map(|(lost_s, at_s)| {
                 format!(
                     "{name}: {lost_s:.3} s are missing after {at_s:.2} s; the part after the gap is treated as a separate trial"
                 )

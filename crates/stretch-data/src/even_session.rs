@@ -167,7 +167,7 @@ impl EvenSession {
             let notes = one.notes.iter().map(|note| format!("{}: {note}", one.trial.name));
             session.notes.extend(notes);
             session.rows.add(even.rows);
-            session.notes.extend(even.notes);
+            session.notes.extend(even.gaps.into_iter().chain(even.notes));
             let turns = session.turns.iter_mut().zip(even.turns);
             turns.for_each(|(known, turn)| *known = known.or(turn));
             session.trials.extend(even.parts.into_iter().enumerate().map(|(i, part)| EvenTrial {

@@ -29,7 +29,7 @@ fn an_even_trial_is_taken_to_the_bit_and_nothing_is_said() {
     let even = trial.even(&["length_mm", "inlet"], SPEC).expect("even");
     assert_eq!(even.parts[0].columns[0], trial.channels[0].values);
     assert_eq!(even.parts[0].columns[1], trial.channels[1].values);
-    assert!(even.notes.is_empty() && even.rows.note().is_none());
+    assert!(even.notes.is_empty() && even.gaps.is_empty() && even.rows.note().is_none());
 }
 
 #[test]
@@ -42,7 +42,7 @@ fn every_gap_of_up_to_three_samples_is_bridged_and_a_longer_one_cuts() {
         if lost > 3 {
             assert_eq!((even.parts.len(), even.rows.bridged), (2, 0));
             assert!((even.parts[1].begin_s - 0.01 * (80 + lost) as f64).abs() < ROUNDING);
-            assert!(even.notes[0].contains("missing after 0.79 s"), "{:?}", even.notes);
+            assert!(even.gaps[0].contains("missing after 0.79 s"), "{:?}", even.gaps);
             continue;
         }
         assert_eq!((even.parts.len(), even.rows.bridged), (1, lost));

@@ -164,7 +164,7 @@ pub struct Rated {
     pub dead_band: f64,
     /// Counts of the rows.
     pub rows: Rows,
-    /// Changes made to the data, one sentence each.
+    /// Gaps, and changes made to the data, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -226,5 +226,11 @@ pub fn rated(
         Ok(RatedPart { even, rate })
     };
     let parts = even.parts.into_iter().map(with_rate).collect::<Result<_, CalibrateError>>()?;
-    Ok(Rated { sample_rate, parts, dead_band, rows: even.rows, notes: even.notes })
+    Ok(Rated {
+        sample_rate,
+        parts,
+        dead_band,
+        rows: even.rows,
+        notes: [even.gaps, even.notes].concat(),
+    })
 }

@@ -61,10 +61,12 @@ impl Prepared {
                 options.signal
             )));
         }
-        let (sample_rate, Evened { pieces, rows, mut notes, .. }) = Evened::of(trials, options)?;
+        let (sample_rate, Evened { pieces, rows, gaps, mut notes, .. }) =
+            Evened::of(trials, options)?;
         notes.extend(rows.note());
         let names: Vec<&str> = trials.iter().map(|trial| trial.name.as_str()).collect();
-        let doubts = doubts(&names, &pieces, sample_rate.hz(), options);
+        let of_trials = doubts(&names, &pieces, sample_rate.hz(), options);
+        let doubts = [gaps, of_trials].concat();
         let target = target(options, &pieces)?;
         let pairs = pieces.iter().flat_map(|(_, [signal, reference, _])| {
             signal.iter().zip(reference).map(|(&v, &x)| (v, target.from_reference(x)))
@@ -155,6 +157,7 @@ impl Prepared {
 struct Evened {
     pieces: Vec<Piece>,
     rows: Rows,
+    gaps: Vec<String>,
     notes: Vec<String>,
     /// The jump of a reference that wraps, in its unit, if the reference wraps in any trial.
     turn: Option<f64>,
@@ -202,6 +205,7 @@ impl Evened {
         let even = even(trial, &columns, 1, sample_rate)?;
         self.turn = self.turn.or(even.turns[1]);
         self.rows.add(even.rows);
+        self.gaps.extend(even.gaps);
         self.notes.extend(even.notes);
         self.pieces.extend(even.parts.into_iter().filter_map(|part| {
             let mut columns = part.columns.into_iter();

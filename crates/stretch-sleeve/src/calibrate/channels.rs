@@ -95,7 +95,7 @@ impl Channels {
         columns.push(reference);
         let even = even(&trial, &columns, signals.len(), self.sample_rate)?;
         self.notes.extend(even.rows.note());
-        self.notes.extend(even.notes);
+        self.notes.extend(even.gaps.into_iter().chain(even.notes));
         let period_s = self.sample_rate.period_s();
         for mut part in even.parts {
             let Some(reference) = part.columns.pop() else { continue };

@@ -386,6 +386,7 @@ impl Placed {
         spec.is_found = self.kind.find.is_some();
         spec.drifts = self.kind.drifts;
         spec.kind = Some(self.kind);
+        spec.family = self.kind.family;
         let is_twin = |other: &&Self| {
             other.site.stage == self.site.stage
                 && other.name != self.name

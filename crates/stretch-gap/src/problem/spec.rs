@@ -6,7 +6,7 @@
 use std::ops::Range;
 
 use serde::Serialize;
-use stretch_effects::{EffectParameter, Kind};
+use stretch_effects::{EffectParameter, Family, Kind, Measure};
 
 use crate::problem::noise::Noise;
 
@@ -150,9 +150,13 @@ pub struct EffectSpec {
     /// If the effect improves the fit only through these errors, it shows only an error that the
     /// two outputs have in common.
     pub reads: Option<usize>,
-    /// The effect's kind, if it is in the catalogue of kinds.
+    /// The effect's kind, if it is a wrapper around a simulator.
     #[serde(skip)]
     pub kind: Option<&'static Kind>,
+    /// The property that the effect shares with others, and the function that computes its size from the values of the
+    /// parameters.
+    #[serde(skip)]
+    pub family: Option<(Family, Measure)>,
 }
 
 impl EffectSpec {
@@ -181,6 +185,7 @@ impl EffectSpec {
             twins: Vec::new(),
             reads: None,
             kind: None,
+            family: None,
         }
     }
 

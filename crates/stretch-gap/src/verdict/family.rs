@@ -14,7 +14,7 @@ use crate::{
 pub struct EffectFamily {
     /// The effects, the named one first.
     pub names: Vec<String>,
-    /// Titles of their kinds, each once, such as "a delay".
+    /// Titles of their kinds, each once, such as "a delay"; none if the effects have titles of their own.
     pub titles: Vec<String>,
     /// The property that they share: `late` or `loop`.
     #[schemars(with = "String")]
@@ -37,14 +37,13 @@ impl EffectFamily {
         simulator: &dyn Simulator,
     ) -> Option<Self> {
         let spec = |name: &str| simulator.effects().iter().find(|e| e.name == name);
-        let kind = |spec: &EffectSpec| spec.kind.and_then(|kind| kind.family);
         let own = spec(name)?;
-        let (property, _) = kind(own)?;
+        let (property, _) = own.family?;
         let is_alike = |other: &&EffectSpec| {
             let is_there = property == Family::Late || side(other) == side(own);
             is_there
                 && other.touches == own.touches
-                && kind(other).is_some_and(|(p, _)| p == property)
+                && other.family.is_some_and(|(p, _)| p == property)
         };
         let others = alternatives.iter().filter_map(|name| spec(name)).filter(is_alike);
         let all: Vec<&EffectSpec> = std::iter::once(own).chain(others).collect();
@@ -131,7 +130,7 @@ fn side(effect: &EffectSpec) -> &str {
 
 /// Returns the property's size for an effect, from the most probable candidate with this effect.
 fn size(effect: &EffectSpec, candidates: &[Candidate]) -> Option<f64> {
-    let (_, measure) = effect.kind?.family?;
+    let (_, measure) = effect.family?;
     let candidate = candidates.iter().find(|c| c.effects.contains(&effect.name))?;
     let own = candidate.parameters.iter().filter(|p| p.effect == effect.name);
     Some(measure(&own.map(|p| p.value).collect::<Vec<_>>()))

@@ -1,8 +1,9 @@
 //! Converts effects of the catalogue into effects for the diagnosis.
 
 use stretch_data::in_digits;
+use stretch_effects::{Family, Measure};
 use stretch_gap::{Description, EffectSpec};
-use stretch_sim::{Effect, EffectParameter, Search};
+use stretch_sim::{Acts, Effect, EffectParameter, Search};
 
 /// Where an effect acts, and the values at which it is looked for.
 pub(crate) struct Place {
@@ -29,7 +30,18 @@ fn spec(effect: &Effect, place: Place) -> EffectSpec {
         is_found: effect.find().is_some(),
         drifts: effect.drifts(),
         twins: effect.twins.iter().map(|twin| (*twin).to_owned()).collect(),
+        family: lateness(effect),
         ..EffectSpec::new(effect.name, stage, parameters)
+    }
+}
+
+/// The time by which an effect makes a signal late; `None` for an effect that does something else.
+fn lateness(effect: &Effect) -> Option<(Family, Measure)> {
+    match effect.acts {
+        Acts::At { kind, values: None, .. } => {
+            kind.family.filter(|(what, _)| *what == Family::Late)
+        }
+        _ => None,
     }
 }
 
@@ -70,4 +82,24 @@ pub(super) fn shown(
             None
         })
         .unzip()
+}
+
+#[cfg(test)]
+mod tests {
+    use stretch_sim::Catalogue;
+
+    use super::*;
+
+    #[test]
+    fn effects_that_make_a_signal_late_say_by_how_much() {
+        let late = |effect: &'static Effect| {
+            let (_, measure) = lateness(effect)?;
+            Some((effect.name, measure(&[0.06, 0.25])))
+        };
+        let late: Vec<(&str, f64)> = Catalogue::default().iter().filter_map(late).collect();
+        // An inertia delays slow motions by 2 damping m.
+        let expected =
+            [("crossbeam_inertia", 0.03), ("amplifier_lowpass", 0.06), ("channel_skew", 0.06)];
+        assert_eq!(late, expected);
+    }
 }

@@ -105,7 +105,9 @@ pub(crate) fn instead(error: &clap::Error) -> Option<String> {
             }
             false => "name the calibration with --calibration cal.json",
         };
-        return Some(format!("{name}: one file was already named; {instead}"));
+        return Some(format!(
+            "{name}: only one file can be named here, and this is the second; {instead}"
+        ));
     }
     let name = name.split(['=', ' ']).next()?;
     let (_, instead) = table.iter().find(|(old, _)| *old == name)?;

@@ -216,7 +216,7 @@ fn a_fault_of_a_test_trial_has_a_doubt_of_its_own() {
         (&["delayed"], "ms after the reference", |t| t.channels[SIGNAL].values.rotate_right(40)),
         (&["delayed"], "ms before the reference", |t| t.channels[SIGNAL].values.rotate_left(40)),
         (&["clipped_signal"], "stays at 1.9", |t| change(t, SIGNAL, |v| v.min(1.9))),
-        (&["other_unit"], "with the other sign", |t| change(t, SIGNAL, |v| -v)),
+        (&["other_unit"], "With the sign reversed", |t| change(t, SIGNAL, |v| -v)),
         (&["other_sensor"], "the calibrated sensor", |t| change(t, SIGNAL, |v| 7.0 + v)),
     ];
     for (codes, says, spoil) in members {

@@ -164,7 +164,7 @@ impl fmt::Display for Nearest<'_> {
         match self.0 {
             // A time column is renamed when it is read.
             _ if self.1 == "time_s" && self.2.iter().any(|name| name == "time_s") => {
-                f.write_str(" among the signals and references (it holds the times of the samples)")
+                f.write_str(" for a signal or a reference, because it holds the times")
             }
             _ if matches!(unit(self.1), Some("s" | "ms" | "us" | "ns"))
                 && self.2.iter().any(|name| name == "time_s") =>

@@ -166,11 +166,14 @@ pub(super) fn delayed(
     let is_most = samples != 0.0 && 2.0 * undelayed * undelayed <= rmse * rmse;
     let text = (is_most && rmse > ALIKE * fit_rmse).then(|| {
         let with_unit = |x: f64| format!("{} {unit}", in_digits(x, 4)).trim_end().to_owned();
-        let side = if samples > 0.0 { "after" } else { "before" };
+        let ms = 1e3 * lag_s.unwrap_or_default().abs();
+        let [side, shift] = match samples > 0.0 {
+            true => ["after".to_owned(), format!("subtract {ms:.0} ms from")],
+            false => ["before".to_owned(), format!("add {ms:.0} ms to")],
+        };
         format!(
-            "the estimate comes {:.0} ms {side} the reference, and without this delay the RMSE would be {} instead of {}: were signal \
-             and reference recorded by two recorders that did not start together? If so, shift the times of one of them",
-            1e3 * lag_s.unwrap_or_default().abs(),
+            "the estimate comes {ms:.0} ms {side} the reference, and without this delay the RMSE would be {} instead of {}. If two \
+             recorders did not start together, {shift} the times of the signal; if they did, calibrate again",
             with_unit(undelayed),
             with_unit(rmse)
         )

@@ -46,7 +46,7 @@ pub struct Reach {
     seen: Interval,
     /// For each power of ten, the number of samples that lie inside after multiplication by that power.
     inside: [u64; COUNT],
-    /// Number of samples that lie inside with the other sign.
+    /// Number of samples that lie inside with the sign reversed.
     reversed: u64,
     /// Number of samples that are [far](FAR) outside.
     far: u64,
@@ -119,7 +119,9 @@ impl Reach {
                 let asked = "are the wires of the sensor exchanged?";
                 (
                     "other_unit",
-                    format!("{sentence}: {asked} {inside} lie inside with the other sign"),
+                    format!(
+                        "{sentence}: {asked} With the sign reversed, {inside} lie inside; exchange the wires, or change the sign with stretch convert"
+                    ),
                 )
             }
             None if 2 * self.far > self.samples => ("other_sensor", format!("{sentence}{OTHER}")),

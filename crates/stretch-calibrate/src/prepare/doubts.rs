@@ -189,8 +189,8 @@ impl Held<'_> {
     fn clipped(&self, signal: &str, reference: &str) -> Option<String> {
         let (end, name) = (self.stands_at()?, self.name);
         Some(format!(
-            "{signal} stays at {end} in {name} while {reference} moves on: is the amplifier or the converter at its limit? Values beyond it are \
-             lost; lower the gain, or leave that part out"
+            "{signal} stays at {end} in {name} while {reference} moves on: the amplifier or the converter is probably at its limit, and values \
+             beyond it are lost. Lower the gain and record again, or leave that part out"
         ))
     }
 
@@ -306,7 +306,7 @@ pub(super) fn doubts(
     }
     if samples < TELLING && !options.is_table {
         said.push(format!(
-            "the trials have {samples} samples in total: a fit to so few says little about other motion; record half a minute over the whole range"
+            "the trials have {samples} samples in total, too few for a reliable calibration: record half a minute over the whole range"
         ));
     }
     let all = Line::of(pieces.iter()).spreads[1];

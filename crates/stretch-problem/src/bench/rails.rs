@@ -20,8 +20,8 @@ pub(crate) fn rails(columns: &Columns, name: &str, noise: f64) -> Vec<String> {
         let share = count as f64 / values.len().max(1) as f64;
         (share > SHARE && noise_off(values, end) > NOISY * noise).then(|| {
             format!(
-                "{name} is at {end}{}, its {which} value, in {:.1} % of the samples: its recorder looks saturated, and all values \
-                 beyond it are lost; change range, gain or zero",
+                "{name} is at {end}{}, its {which} value, in {:.1} % of the samples: the recorder is probably saturated, and all \
+                 values beyond are lost; lower the gain, widen the range or move the zero, and record again",
                 after_number(&unit_of(name)),
                 100.0 * share
             )

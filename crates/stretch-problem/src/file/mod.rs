@@ -17,8 +17,8 @@ pub(crate) use simulator::{simulator, simulator_schema};
 /// Name of a problem's file in a folder.
 pub(crate) const IN_FOLDER: &str = "problem.toml";
 /// What is wrong with a rig file in the place of a problem's file.
-const RIG: &str = "this file describes a rig or a gauge that is built in, not a problem; to see what it leaves of a new recording, run \
-                   stretch diagnose NEW --rig with this file";
+const RIG: &str = "this file describes a built-in rig or gauge, but a problem file is needed here; to see how much of a new recording \
+                   it does not explain, run stretch diagnose NEW --rig with this file";
 /// The current folder.
 const HERE: &str = ".";
 

@@ -69,8 +69,8 @@ pub(super) fn read_hello(frame: &WorkerFrame, session: &RecordedSession) -> Resu
         .map_err(|e| format!("its hello is invalid: {e}"))?;
     if hello.version != VERSION {
         return Err(format!(
-            "it speaks version {} of the protocol, but this program speaks version {VERSION}: send the messages of that version, which the \
-             page on the worker protocol lists, and answer with \"version\": {VERSION}",
+            "it speaks version {} of the protocol, but this program speaks only version {VERSION}: change the worker to send the messages of \
+             that version, which the page on the worker protocol lists",
             hello.version
         ));
     }

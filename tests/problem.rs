@@ -220,7 +220,7 @@ fn a_problem_of_the_built_in_gauge_is_its_data_set() {
     let text = "[simulator]\nbuiltin = \"gauge\"\ndata_set = \"rod.csv\"\nreference = \"rod_mm\"\nsignal = \"s1\"\n";
     fs::write(folder.path().join("problem.toml"), text).unwrap();
     let (is_good, text) = said(folder.path(), &[]);
-    let begin = "The calibration line lacks the time offset between signal and reference";
+    let begin = "The calibration line lacks an effect that makes s1 late by 50 ms (the time offset between signal and reference";
     assert!(is_good && text.starts_with(begin), "{text}");
 }
 

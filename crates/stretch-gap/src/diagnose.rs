@@ -33,7 +33,7 @@ use crate::{
     },
     verdict::{
         answer::{Answer, Findings},
-        coverage::{TooLittle, is_short, too_little},
+        coverage::{TooLittle, too_little},
         diagnosis::{Diagnosis, Unexplained, VerdictKind},
         judge::{Case, Judged, judge},
         note::Note,
@@ -383,7 +383,6 @@ fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Judged {
         sanity,
         is_record: !cause.gross.is_empty(),
         too_little: gathered.too_little,
-        is_short: is_short(&evidence.roles),
     };
     judge(&case, &task.options.thresholds)
 }

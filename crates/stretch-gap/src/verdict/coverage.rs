@@ -3,10 +3,7 @@
 //! A named effect is a statement about the rig, not about the rows that happened to be usable. At
 //! least the share [`LEAST_SHARE`] of the rows is needed, so that the answer covers most of the
 //! recording. At least [`LEAST_TEST`] blocks of samples are needed for testing, because a bootstrap
-//! of fewer blocks gives no 95 % interval. Twice as many are needed for fitting. Fewer than
-//! [`SHORT`] blocks for fitting contain only a few motions, so that different lags cannot be
-//! distinguished. Then every set of effects that closes at least the lower end of the most probable
-//! set's 95 % interval is a tie with that set, whatever its probability.
+//! of fewer blocks gives no 95 % interval. Twice as many are needed for fitting.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -65,15 +62,13 @@ impl TooLittle {
     }
 }
 
-/// Number of blocks for fitting below which different lags cannot be distinguished.
-const SHORT: f64 = 120.0;
-
 /// Returns the reason why the recording is not sufficient to name an effect; `None` if it is.
 pub(crate) fn too_little(roles: &SampleRoles, rows: RowsUsed, dt_s: f64) -> Option<TooLittle> {
     if rows.share() < LEAST_SHARE {
         return Some(TooLittle::Rows(rows));
     }
-    let (fit, test) = (fitted(roles), roles.blocks(Role::Test));
+    let fit = roles.blocks(Role::Fit) + roles.blocks(Role::Held);
+    let test = roles.blocks(Role::Test);
     let block_s = roles.block as f64 * dt_s;
     // Rounded, because a recording of 20 s may lack some samples.
     (fit.round() < LEAST_FIT || test.round() < LEAST_TEST).then_some(TooLittle::Short {
@@ -81,17 +76,6 @@ pub(crate) fn too_little(roles: &SampleRoles, rows: RowsUsed, dt_s: f64) -> Opti
         test_s: test * block_s,
         block_s,
     })
-}
-
-/// Whether so few blocks were fitted that sets that close about the same share of the gap are
-/// treated as ties.
-pub(crate) fn is_short(roles: &SampleRoles) -> bool {
-    fitted(roles) < SHORT
-}
-
-/// Returns the number of blocks that are fitted or held out.
-fn fitted(roles: &SampleRoles) -> f64 {
-    roles.blocks(Role::Fit) + roles.blocks(Role::Held)
 }
 
 #[cfg(test)]
@@ -124,6 +108,5 @@ mod tests {
         // The same numbers of samples at 500 Hz, for a motion that turns five times a second.
         let quick = SampleRoles { block: 50, ..roles(3000, 1000) };
         assert_eq!(too_little(&quick, all, 0.002), None);
-        assert!(is_short(&quick));
     }
 }

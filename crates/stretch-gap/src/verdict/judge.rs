@@ -41,9 +41,6 @@ pub(crate) struct Case<'a> {
     pub(crate) is_record: bool,
     /// The reason why the recording is not sufficient to name an effect, if it is not.
     pub(crate) too_little: Option<TooLittle>,
-    /// Whether so few blocks were fitted that sets that close about the same share of the gap are
-    /// treated as ties.
-    pub(crate) is_short: bool,
 }
 
 /// The verdict with the names of effects.
@@ -95,7 +92,7 @@ pub(crate) fn judge(case: &Case<'_>, thresholds: &Thresholds) -> Judged {
 
 /// Returns the names that belong to a verdict.
 fn naming(case: &Case<'_>, seen: VerdictKind, thresholds: &Thresholds) -> Naming {
-    let all = Naming::of(case.candidates, case.shares, thresholds, case.is_short);
+    let all = Naming::of(case.candidates, case.shares, thresholds);
     match seen {
         VerdictKind::Effect | VerdictKind::Partial => all,
         // Effects that are probable but small are reported below the headline.
@@ -207,7 +204,6 @@ mod tests {
             sanity: &SOUND,
             is_record: false,
             too_little: None,
-            is_short: false,
         };
         change(&mut case);
         judge(&case, &Thresholds::frozen())
@@ -271,7 +267,6 @@ mod tests {
             sanity: &SOUND,
             is_record: false,
             too_little: None,
-            is_short: false,
         };
         let verdict = judge(&case, &Thresholds::frozen());
         assert_eq!((verdict.kind, verdict.naming()), (Unknown, Naming::default()));
@@ -307,7 +302,6 @@ mod tests {
                 sanity: &sanity,
                 is_record: false,
                 too_little: None,
-                is_short: false,
             };
             judge(&case, &Thresholds::frozen()).kind
         };

@@ -5,9 +5,11 @@
 //! correspond to a hundred-thousandth of the gap. Therefore the part of the gap that an effect
 //! closes in one of its stages, on fitted or on test trials, must be a relevant gap by itself, and
 //! the effect must close a part of the gap on trials that were not fitted; otherwise the effect is
-//! reported as faint. Alternatives come from the smallest collection of
-//! sets that holds 95 % of the probability. If one of these sets differs from the most probable set
-//! in a single effect, the two effects in which they differ are a tie.
+//! reported as faint. Alternatives come from the smallest collection of sets that holds 95 % of the
+//! probability, and from the sets that close as much of the gap on test trials: at least the lower end
+//! of the 95 % interval of the most probable set. Their probability may be low only because the forms
+//! of their effects are not exactly those of the rig. If one of these sets differs from the most
+//! probable set in a single effect, the two effects in which they differ are a tie.
 
 use crate::{
     evidence::{candidates::Candidate, probability::covering, shares::EffectShare},
@@ -32,7 +34,6 @@ impl Naming {
         candidates: &[Candidate],
         shares: &[EffectShare],
         thresholds: &Thresholds,
-        is_short: bool,
     ) -> Self {
         let Some(first) = candidates.first() else { return Self::default() };
         let share = |name: &str| shares.iter().find(|s| s.effect == name);
@@ -46,9 +47,7 @@ impl Naming {
         if named.is_empty() && !faint.is_empty() {
             named.push(faint.remove(0));
         }
-        // In a short recording, the probabilities of sets that close the same share of the gap may
-        // differ too much.
-        let closes_alike = |c: &Candidate| is_short && c.closed >= first.closed_ci[0];
+        let closes_alike = |c: &Candidate| c.closed >= first.closed_ci[0];
         let held = covering(&candidates.iter().map(|c| c.probability).collect::<Vec<_>>());
         let rivals = candidates.iter().enumerate().skip(1);
         let rivals = rivals.filter(|(i, c)| *i < held || closes_alike(c)).map(|(_, c)| c);
@@ -131,7 +130,7 @@ mod tests {
             candidate(&["slack", "leak"], 0.04),
         ];
         let shares = [share("slack", 0.95), share("sag", 0.0)];
-        let naming = Naming::of(&candidates, &shares, &Thresholds::frozen(), false);
+        let naming = Naming::of(&candidates, &shares, &Thresholds::frozen());
         assert_eq!(
             (naming.named.as_slice(), naming.faint.as_slice()),
             (&["slack".to_owned()][..], &["sag".to_owned()][..])
@@ -140,26 +139,24 @@ mod tests {
         assert!((naming.probability(&candidates) - 0.96).abs() < 1e-12);
         // An effect that closes nothing on trials that were not fitted is not named.
         let fitted = [share("slack", 0.95), EffectShare { closes: -0.01, ..share("sag", 0.4) }];
-        assert_eq!(Naming::of(&candidates, &fitted, &Thresholds::frozen(), false), naming);
-        // In a short recording, a set that closes as much is a tie, whatever its probability.
-        let short = Naming::of(&candidates, &shares, &Thresholds::frozen(), true);
-        assert_eq!(short.ties.len(), 1);
-        let sure = [candidate(&["slip"], 0.999), candidate(&["lowpass"], 0.001)];
-        let alike = |is_short| {
-            let shares = [share("slip", 0.9)];
-            Naming::of(&sure, &shares, &Thresholds::frozen(), is_short).ties
+        assert_eq!(Naming::of(&candidates, &fitted, &Thresholds::frozen()), naming);
+        // A set that closes as much is a tie, whatever its probability, and one that closes less is not.
+        let ties = |closed| {
+            let other = Candidate { closed, ..candidate(&["lowpass"], 0.001) };
+            let both = [candidate(&["slip"], 0.999), other];
+            Naming::of(&both, &[share("slip", 0.9)], &Thresholds::frozen()).ties
         };
-        assert_eq!((alike(false), alike(true)), (vec![], vec![("slip".into(), "lowpass".into())]));
+        assert_eq!(ties(0.8), [("slip".into(), "lowpass".into())]);
+        assert_eq!(ties(0.79), []);
         // If all effects are small, the strongest is named nevertheless.
         let weak = Naming::of(
             &candidates,
             &[share("slack", 0.0), share("sag", 0.0)],
             &Thresholds::frozen(),
-            false,
         );
         assert_eq!(weak.named, ["slack"]);
         assert_eq!(
-            Naming::of(&[candidate(&[], 1.0)], &[], &Thresholds::frozen(), false),
+            Naming::of(&[candidate(&[], 1.0)], &[], &Thresholds::frozen()),
             Naming::default()
         );
     }

@@ -45,7 +45,7 @@ fn candidate(effects: Vec<String>, probability: f64, random: &mut RandomGenerato
 
 /// Random candidates, the most probable first, and shares of the first one's effects, the strongest
 /// first.
-fn drawn(random: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>, bool) {
+fn drawn(random: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>) {
     let mut candidates = Vec::new();
     for probability in [0.6, 0.3, 0.1] {
         let effects = set(random);
@@ -61,7 +61,7 @@ fn drawn(random: &mut RandomGenerator) -> (Vec<Candidate>, Vec<EffectShare>, boo
         })
         .collect();
     shares.sort_by(|a, b| b.closes.total_cmp(&a.closes));
-    (candidates, shares, random.unit() < 0.2)
+    (candidates, shares)
 }
 
 /// Named and faint effects together form the first set. A tie is between a named effect and one
@@ -73,8 +73,8 @@ fn names_part_the_first_set() {
     let simulator = Toy::of(&[Law::Line]).measured(1);
     let mut ties = 0;
     for _ in 0..5000 {
-        let (candidates, shares, is_short) = drawn(&mut random);
-        let naming = Naming::of(&candidates, &shares, &thresholds, is_short);
+        let (candidates, shares) = drawn(&mut random);
+        let naming = Naming::of(&candidates, &shares, &thresholds);
         let both: Vec<&String> = naming.named.iter().chain(&naming.faint).collect();
         let parted: BTreeSet<&String> = both.iter().copied().collect();
         assert_eq!(parted.len(), both.len());
@@ -99,8 +99,8 @@ fn what_is_named_counts() {
     let mut random = RandomGenerator::new(5, 0);
     let thresholds = Thresholds::frozen();
     for _ in 0..5000 {
-        let (candidates, shares, is_short) = drawn(&mut random);
-        let naming = Naming::of(&candidates, &shares, &thresholds, is_short);
+        let (candidates, shares) = drawn(&mut random);
+        let naming = Naming::of(&candidates, &shares, &thresholds);
         let share = |name: &String| shares.iter().find(|s| s.effect == *name);
         let counts =
             |name: &String| share(name).is_some_and(|s| s.closes_excess >= thresholds.least_gap);

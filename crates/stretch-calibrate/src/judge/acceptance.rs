@@ -102,6 +102,11 @@ const FAR_OFF_PERCENT: f64 = 5.0;
 const OFF_PERCENT: f64 = 1.0;
 const SEVERAL: f64 = 5.0;
 
+/// Formats a number with its unit.
+fn with_unit(x: f64, unit: &str) -> String {
+    format!("{} {unit}", in_digits(x, 4)).trim_end().to_owned()
+}
+
 /// Largest ratio of the RMSE without the mean error to the RMSE of the fit at which the calibration
 /// still holds apart from a shift.
 const ALIKE: f64 = 1.25;
@@ -128,15 +133,14 @@ pub(super) fn off_throughout(
     let alike = ALIKE * fit_rmse;
     let is_shift = unshifted <= bias.abs() || (unshifted <= alike && alike < rmse);
     let text = (is_far && is_shift).then(|| {
-        let with_unit = |x: f64| format!("{} {unit}", in_digits(x, 4)).trim_end().to_owned();
         let side = if bias > 0.0 { "above" } else { "below" };
         format!(
             "was the sensor put on again? The estimate is shifted: it is {} {side} the reference on average. Without this shift, the \
              RMSE would be {} instead of {}. Calibrate again: half a minute of reference is enough (stretch calibrate --model auto; \
              several gauges: with a prior of earlier sessions, --prior)",
-            with_unit(bias.abs()),
-            with_unit(unshifted),
-            with_unit(rmse)
+            with_unit(bias.abs(), unit),
+            with_unit(unshifted, unit),
+            with_unit(rmse, unit)
         )
     });
     text.map(|text| Doubt::new("constant_error", text))
@@ -165,7 +169,6 @@ pub(super) fn delayed(
     let undelayed = (sum / f64::max(count, 1.0)).sqrt();
     let is_most = samples != 0.0 && 2.0 * undelayed * undelayed <= rmse * rmse;
     let text = (is_most && rmse > ALIKE * fit_rmse).then(|| {
-        let with_unit = |x: f64| format!("{} {unit}", in_digits(x, 4)).trim_end().to_owned();
         let ms = 1e3 * lag_s.unwrap_or_default().abs();
         let [side, shift] = match samples > 0.0 {
             true => ["after".to_owned(), format!("subtract {ms:.0} ms from")],
@@ -174,8 +177,8 @@ pub(super) fn delayed(
         format!(
             "the estimate comes {ms:.0} ms {side} the reference, and without this delay the RMSE would be {} instead of {}. If two \
              recorders did not start together, {shift} the times of the signal; if they did, calibrate again",
-            with_unit(undelayed),
-            with_unit(rmse)
+            with_unit(undelayed, unit),
+            with_unit(rmse, unit)
         )
     });
     text.map(|text| Doubt::new("delayed", text))

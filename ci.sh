@@ -200,11 +200,15 @@ others() { cargo "$1" --quiet --locked --all-features $(packages $OTHERS $FLEET)
 # what `cargo test --no-run` builds, and the two modules for Python, which it does not build
 others build --lib --bins --tests --examples
 
-step "what ran in the background"
-joined firmware
-joined page
-joined fuzzing
-spare fuzz/target firmware/target "$target/wasm" "$target/wasm32-unknown-unknown"
+# what needs no compiler: mostly it waits for pip, a browser or one thread
+if [ "$what" = deep ]; then
+    aside python python/gate.sh
+else
+    # the module that was built with the other members; deep builds the wheel
+    aside python env MODULE="$target/debug/lib_stretch.so" python/gate.sh
+fi
+aside cases challenge/gate.sh
+aside browser web/gate.sh built
 
 step "tests of the other members, and with all features"
 # the words of a test that skips are those of its output
@@ -224,19 +228,18 @@ if [ -n "$FLEET" ]; then
     MODULE=$target/debug/libstretch_datafusion.so fleet/python/gate.sh
 fi
 
-step "Python package"
-if [ "$what" = deep ]; then
-    python/gate.sh
-else
-    # the module that was built with the other members; deep builds the wheel
-    MODULE=$target/debug/lib_stretch.so python/gate.sh
-fi
-
-step "the blind check: four cases, and cases of each plant of the benchmark"
-challenge/gate.sh
-
-step "reports and page in a browser"
-web/gate.sh
+step "what ran in the background"
+# in the order in which they ran
+joined firmware
+joined page
+joined fuzzing
+spare fuzz/target firmware/target "$target/wasm" "$target/wasm32-unknown-unknown"
+# the Python package
+joined python
+# the blind check: four cases, and cases of each plant of the benchmark
+joined cases
+# reports and page in a browser
+joined browser
 
 step "the page inside the program"
 if [ -f "$target/page/index.html" ]; then

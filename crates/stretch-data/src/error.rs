@@ -313,7 +313,7 @@ pub fn error_sentence(error: &dyn Error) -> String {
 }
 
 /// Removes Rust's `(os error 28)` from a text, because it repeats the text before it.
-fn without_numbers(text: &str) -> String {
+pub(crate) fn without_numbers(text: &str) -> String {
     let mut parts = text.split(" (os error ");
     let mut text = parts.next().unwrap_or_default().to_owned();
     for part in parts {

@@ -12,10 +12,7 @@ use std::{
 
 use tempfile::Builder;
 
-use super::{
-    FileError,
-    folder::{lock, replace},
-};
+use super::{FileError, folder::replace};
 
 /// Temporary names of this process, with the paths that they will replace. Temporary names of folders stay in the list
 /// after the rename, because messages may contain them.
@@ -86,54 +83,30 @@ pub(super) struct Draft {
     /// remains of a killed program. `None` for a folder.
     pub(super) file: Option<File>,
     /// Whether a folder may replace one that is not empty.
-    force: bool,
+    pub(super) force: bool,
     /// The folder that is replaced, locked.
-    replaced: Option<File>,
-    /// Folders made for the target. They are removed after the draft if they are still empty.
-    _parents: Option<Parents>,
+    pub(super) replaced: Option<File>,
 }
 
 impl Draft {
-    pub(super) fn file(path: &Path) -> io::Result<Self> {
-        Self::new(path, false, None)
-    }
-
-    /// Makes the draft of a folder, and its missing parent folders.
-    pub(super) fn folder(path: &Path, force: bool) -> io::Result<Self> {
-        Self::new(path, force, Some(Parents::make(folder_of(path))?))
-    }
-
-    /// Makes the draft of a folder if `parents` is given, otherwise of a file.
-    fn new(path: &Path, force: bool, parents: Option<Parents>) -> io::Result<Self> {
+    /// Makes a temporary file or folder in the folder of its target. If that does not exist, a temporary folder is made in
+    /// the nearest folder above it.
+    pub(super) fn new(path: &Path, is_folder: bool) -> io::Result<Self> {
         let real = real(path);
-        let mut builder = Builder::new();
-        builder.prefix(".stretch-").suffix(".tmp");
-        #[cfg(unix)]
-        {
-            // The umask restricts these permissions, as for any new file or folder.
-            let mode = if parents.is_some() { 0o777 } else { 0o666 };
-            builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(mode));
-        }
+        let exists = |folder: &&Path| is_folder && folder.exists();
+        let parent = real.ancestors().skip(1).find(exists).unwrap_or(folder_of(&real));
         let mut names = names();
         ask("create")?;
-        let (temporary, file) = if parents.is_some() {
-            (builder.tempdir_in(folder_of(&real)).map_err(without_path)?.keep(), None)
-        } else {
-            let made = builder.tempfile_in(folder_of(&real)).map_err(without_path)?;
-            let (file, temporary) = made.keep()?;
-            // If files cannot be locked, no process cleans up.
-            let _ = file.try_lock();
-            (temporary, Some(file))
+        let make = |temporary: &Path| match is_folder {
+            true => fs::create_dir(temporary).map(|()| None),
+            false => File::create_new(temporary).map(Some),
         };
-        let path = path.to_owned();
-        names.push((temporary.clone(), path.clone()));
-        Ok(Self { path, real, temporary, file, force, replaced: None, _parents: parents })
-    }
-
-    /// Waits until no other writer replaces the same folder, and makes other writers wait until
-    /// this draft is dropped.
-    pub(super) fn lock(&mut self) {
-        self.replaced = self.replaced.take().or_else(|| lock(&self.real));
+        let made = Builder::new().prefix(".stretch-").suffix(".tmp").make_in(parent, make)?;
+        let (file, temporary) = made.keep().map_err(|kept| kept.error)?;
+        // If files cannot be locked, no process cleans up.
+        let _ = file.as_ref().map(File::try_lock);
+        names.push((temporary.clone(), path.to_owned()));
+        Ok(Self { path: path.to_owned(), real, temporary, file, force: false, replaced: None })
     }
 
     /// Renames all drafts to their targets. Ctrl-C waits until all are renamed.
@@ -142,15 +115,7 @@ impl Draft {
         let _names = names();
         for draft in drafts {
             let is_folder = draft.file.is_none();
-            if is_folder && cfg!(windows) {
-                // On other systems, renaming a folder replaces an empty one.
-                let _ = fs::remove_dir(&draft.real);
-            }
-            let renamed = match draft.force && draft.real.is_dir() {
-                true => replace(draft),
-                false => rename(&draft.temporary, &draft.real),
-            };
-            renamed.map_err(|cause| match cause.kind() {
+            draft.place().map_err(|cause| match cause.kind() {
                 // Another writer was faster.
                 AlreadyExists | DirectoryNotEmpty | NotADirectory if is_folder => {
                     FileError::exists(&draft.path)
@@ -160,6 +125,20 @@ impl Draft {
             sync_folder(folder_of(&draft.real));
         }
         Ok(())
+    }
+
+    fn place(&mut self) -> io::Result<()> {
+        if self.file.is_none() {
+            fs::create_dir_all(folder_of(&self.real))?;
+            if self.force && self.real.is_dir() {
+                return replace(self);
+            }
+            if cfg!(windows) {
+                // On other systems, renaming a folder replaces an empty one.
+                let _ = fs::remove_dir(&self.real);
+            }
+        }
+        rename(&self.temporary, &self.real)
     }
 }
 
@@ -172,33 +151,6 @@ impl Drop for Draft {
         if ask("remove").is_ok() {
             let _ = remove(&self.temporary);
         }
-    }
-}
-
-/// Folders that were made for a target, the innermost first. On drop, those that are empty are removed.
-#[derive(Debug)]
-struct Parents(Vec<PathBuf>);
-
-impl Parents {
-    fn make(parent: &Path) -> io::Result<Self> {
-        let missing = parent.ancestors().take_while(|path| !path.exists());
-        let missing = Self(missing.map(Path::to_owned).collect());
-        fs::create_dir_all(parent)?;
-        Ok(missing)
-    }
-}
-
-impl Drop for Parents {
-    fn drop(&mut self) {
-        self.0.iter().for_each(|folder| drop(fs::remove_dir(folder)));
-    }
-}
-
-/// Returns the cause without the path, because the name of a temporary file would confuse the user.
-fn without_path(error: io::Error) -> io::Error {
-    match error.to_string().rsplit_once(" at path ") {
-        Some((cause, _)) => io::Error::new(error.kind(), cause.to_owned()),
-        None => error,
     }
 }
 

@@ -11,41 +11,28 @@ use std::{
 use super::{
     FileError,
     draft::{Draft, ask, rename, sync, sync_folder},
-    inputs::check_output,
+    inputs::{check_output, identity},
 };
 use crate::data_set::unchanged_trials;
 
 /// Refuses a folder that cannot be written, or that is not empty unless `force` is set.
 pub(super) fn check(path: &Path, force: bool) -> Result<(), FileError> {
-    let fail = |cause| Err(FileError::io(path.display(), "write it", cause));
-    if path.as_os_str() == "-" {
-        return fail(io::Error::other(
-            "a folder cannot be written to standard output; name a folder",
-        ));
-    }
-    let holds = match fs::symlink_metadata(path) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(()),
-        Ok(_) if path.is_dir() => fs::read_dir(path).map(|mut entries| entries.next().is_some()),
-        Ok(_) if force => {
-            Err(io::Error::other("it exists and is not a folder; choose another name"))
-        }
-        Ok(_) => Ok(true),
-        Err(e) => Err(e),
+    let is_free = match fs::read_dir(path) {
+        Ok(mut entries) => entries.next().is_none(),
+        Err(_) => fs::symlink_metadata(path).is_err(),
     };
-    match holds {
-        Err(cause) => fail(cause),
-        Ok(true) if !force => Err(FileError::exists(path)),
-        Ok(_) if env::current_dir().is_ok_and(|here| is_inside(&here, path)) => {
-            fail(io::Error::other(
-                "the folder in which a program is run cannot be replaced; name another, or run it from outside",
-            ))
-        }
-        Ok(_) => Ok(()),
+    if !is_free && !(force && path.is_dir()) {
+        return Err(FileError::exists(path));
     }
-}
-
-fn is_inside(here: &Path, folder: &Path) -> bool {
-    fs::canonicalize(folder).is_ok_and(|folder| here.starts_with(folder))
+    let is_inside = |here: PathBuf| fs::canonicalize(path).is_ok_and(|path| here.starts_with(path));
+    let problem = if path.as_os_str() == "-" {
+        "a folder cannot be written to standard output; name a folder"
+    } else if env::current_dir().is_ok_and(is_inside) {
+        "the folder in which a program is run cannot be replaced; name another, or run it from outside"
+    } else {
+        return Ok(());
+    };
+    Err(FileError::io(path.display(), "write it", io::Error::other(problem)))
 }
 
 /// Locks a folder that is to be replaced, so that several writers of the same folder wait for each
@@ -57,28 +44,17 @@ pub(super) fn lock(folder: &Path) -> Option<File> {
         let locked = File::open(folder).ok()?;
         locked.lock().ok()?;
         // The previous writer may have replaced the folder that is now locked.
-        if is_still(folder, &locked) {
+        let here = identity(folder, &fs::metadata(folder).ok()?);
+        if here == identity(folder, &locked.metadata().ok()?) {
             return Some(locked);
         }
     }
 }
 
-#[cfg(unix)]
-fn is_still(folder: &Path, locked: &File) -> bool {
-    use super::inputs::numbers;
-    let (here, own) = (fs::metadata(folder), locked.metadata());
-    here.is_ok_and(|here| own.is_ok_and(|own| numbers(&here) == numbers(&own)))
-}
-
-#[cfg(not(unix))]
-fn is_still(_: &Path, _: &File) -> bool {
-    true
-}
-
 /// Links the user's own files in the old folder into the new one, and syncs the new folder to disk.
 pub(super) fn complete(new: &Path, old: &Path) -> io::Result<()> {
     if let Ok(meta) = fs::metadata(old) {
-        carry(old, new, &mut BTreeSet::new(), check_output)?;
+        carry(old, new, &mut BTreeSet::new())?;
         fs::set_permissions(new, meta.permissions())?;
     }
     sync_tree(new)
@@ -102,11 +78,11 @@ fn sync_tree(folder: &Path) -> io::Result<()> {
 
 /// Renames a complete folder to its target, which exists.
 pub(super) fn replace(draft: &mut Draft) -> io::Result<()> {
-    draft.lock();
     let (new, real) = (&draft.temporary, &draft.real);
+    let _locked = draft.replaced.take().or_else(|| lock(real));
     exchange(new, real)?;
     // Carries over files that were added to the old folder in the meantime.
-    carry(new, real, &mut BTreeSet::new(), |_, _| Ok(())).map_err(|why| {
+    carry(new, real, &mut BTreeSet::new()).map_err(|why| {
         // The old folder is not removed, because it contains files of the user.
         let left = std::mem::take(&mut draft.temporary);
         io::Error::other(format!(
@@ -116,26 +92,17 @@ pub(super) fn replace(draft: &mut Draft) -> io::Result<()> {
     })
 }
 
-/// Swaps the names of two folders.
+/// Swaps the names of two folders: in one step where the system can, otherwise in three.
 fn exchange(new: &Path, real: &Path) -> io::Result<()> {
     #[cfg(any(target_os = "linux", target_os = "macos"))]
     {
-        use rustix::{
-            fs::{CWD, RenameFlags, renameat_with},
-            io::Errno,
-        };
-        let in_one_step = || match renameat_with(CWD, new, CWD, real, RenameFlags::EXCHANGE) {
-            Err(Errno::INVAL | Errno::NOSYS | Errno::OPNOTSUPP) => {
-                Err(io::ErrorKind::Unsupported.into())
-            }
-            exchanged => Ok(exchanged?),
-        };
-        match ask("exchange").and_then(|()| in_one_step()) {
-            Err(e) if e.kind() == io::ErrorKind::Unsupported => {}
-            exchanged => return exchanged,
+        use rustix::fs::{CWD, RenameFlags, renameat_with};
+        if ask("exchange").is_ok()
+            && renameat_with(CWD, new, CWD, real, RenameFlags::EXCHANGE).is_ok()
+        {
+            return Ok(());
         }
     }
-    // In three steps, on systems that cannot swap names in one.
     let aside = new.with_extension("old");
     rename(real, &aside)?;
     rename(new, real).inspect_err(|_| drop(rename(&aside, real)))?;
@@ -146,13 +113,10 @@ fn exchange(new: &Path, real: &Path) -> io::Result<()> {
 /// links are impossible, as a copy.
 ///
 /// If `new` is a data set, unchanged trials of the old data set (`replaced`) are not carried over.
-/// `check` is called for every file that is not carried over.
-fn carry(
-    old: &Path,
-    new: &Path,
-    replaced: &mut BTreeSet<PathBuf>,
-    check: fn(&Path, &fs::Metadata) -> io::Result<()>,
-) -> io::Result<()> {
+///
+/// # Errors
+/// A file that is not carried over and that this process has read.
+fn carry(old: &Path, new: &Path, replaced: &mut BTreeSet<PathBuf>) -> io::Result<()> {
     if new.join("dataset.toml").is_file() {
         replaced.extend(unchanged_trials(old));
     }
@@ -168,12 +132,12 @@ fn carry(
                     "{name} is a {kind}, but its new version is not"
                 )));
             }
-            Ok(_) => check(&from, &entry.metadata()?)?,
+            Ok(_) => check_output(&from)?,
             Err(_) if is_folder => {
                 fs::create_dir(&to)?;
                 fs::set_permissions(&to, entry.metadata()?.permissions())?;
             }
-            Err(_) if replaced.contains(&from) => check(&from, &entry.metadata()?)?,
+            Err(_) if replaced.contains(&from) => check_output(&from)?,
             Err(_) => {
                 ask("link")?;
                 match fs::hard_link(&from, &to) {
@@ -184,7 +148,7 @@ fn carry(
             }
         }
         if is_folder {
-            carry(&from, &to, replaced, check)?;
+            carry(&from, &to, replaced)?;
         }
     }
     Ok(())

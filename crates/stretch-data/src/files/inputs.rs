@@ -20,47 +20,41 @@ fn guard() -> MutexGuard<'static, Option<Guard>> {
 
 #[derive(Debug, Default)]
 struct Guard {
-    /// For each output: the option with its path, and the identity of the file that already exists there.
-    outputs: Vec<(String, Option<Identity>)>,
+    outputs: Vec<Output>,
     /// The files that were read, with their paths as given.
     inputs: BTreeMap<Identity, PathBuf>,
 }
 
-/// Identity of a file under all its names: device and inode on Unix, elsewhere the canonical path.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct Identity(#[cfg(unix)] [u64; 2], #[cfg(not(unix))] PathBuf);
-
-/// Returns `None` for anything that is not a regular file: pipes, devices, folders, missing files.
-#[cfg(unix)]
-fn identity_of(_: &Path, meta: &fs::Metadata) -> Option<Identity> {
-    meta.is_file().then(|| Identity(numbers(meta)))
+#[derive(Debug)]
+struct Output {
+    /// The option with its path.
+    shown: String,
+    real: PathBuf,
+    /// The file that already exists there.
+    file: Option<Identity>,
 }
 
-/// Returns device and inode of a file or folder.
+/// Identity of a file or folder under all its names: device and inode on Unix, elsewhere the canonical path.
 #[cfg(unix)]
-pub(super) fn numbers(meta: &fs::Metadata) -> [u64; 2] {
+type Identity = [u64; 2];
+#[cfg(not(unix))]
+type Identity = PathBuf;
+
+#[cfg(unix)]
+pub(super) fn identity(_: &Path, meta: &fs::Metadata) -> Option<Identity> {
     use std::os::unix::fs::MetadataExt;
-    [meta.dev(), meta.ino()]
+    Some([meta.dev(), meta.ino()])
 }
 
 #[cfg(not(unix))]
-fn identity_of(path: &Path, meta: &fs::Metadata) -> Option<Identity> {
-    fs::canonicalize(path).ok().filter(|_| meta.is_file()).map(Identity)
+pub(super) fn identity(path: &Path, _: &fs::Metadata) -> Option<Identity> {
+    fs::canonicalize(path).ok()
 }
 
-fn identity(path: &Path) -> Option<Identity> {
-    identity_of(path, &fs::metadata(path).ok()?)
-}
-
-/// Returns the identity of the file from which standard input is redirected.
-fn standard_input() -> Option<Identity> {
-    #[cfg(unix)]
-    {
-        let stdin = std::os::fd::AsFd::as_fd(&io::stdin()).try_clone_to_owned().ok()?;
-        identity_of(Path::new("-"), &File::from(stdin).metadata().ok()?)
-    }
-    #[cfg(not(unix))]
-    None
+/// Returns `None` for anything that is not a regular file: pipes, devices, folders, missing files.
+fn identity_of_file(path: &Path) -> Option<Identity> {
+    let meta = fs::metadata(path).ok().filter(fs::Metadata::is_file)?;
+    identity(path, &meta)
 }
 
 /// Guards the inputs of this process against being overwritten: [`open_input`] refuses a file that
@@ -74,29 +68,32 @@ fn standard_input() -> Option<Identity> {
 /// standard input.
 pub fn guard_inputs(outputs: impl IntoIterator<Item = (String, PathBuf)>) -> Result<(), FileError> {
     let mut guarded = Guard::default();
-    let mut before: Vec<(String, PathBuf)> = Vec::new();
-    let stdin = standard_input();
+    let stdin = identity_of_file(Path::new("/dev/stdin"));
     for (option, path) in outputs {
         let is_stream = fs::metadata(&path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
         if is_stream || is_standard_output(&path) {
             continue;
         }
-        let (shown, own, real) =
-            (format!("{option} {}", path.display()), identity(&path), real(&path));
-        let fail = |cause| Err(FileError::io(&shown, "write it", io::Error::other(cause)));
-        for ((other, other_real), (_, identity)) in before.iter().zip(&guarded.outputs) {
-            let is_same = own.is_some() && own == *identity;
-            if is_same || real.starts_with(other_real) || other_real.starts_with(&real) {
-                return fail(format!(
-                    "{other} is the same file, or one lies in the other; choose another path for one of them"
-                ));
-            }
-        }
-        if own.is_some() && own == stdin {
-            return fail("it is also standard input; choose another file".to_owned());
-        }
-        guarded.outputs.push((shown.clone(), own));
-        before.push((shown, real));
+        let shown = format!("{option} {}", path.display());
+        let (real, file) = (real(&path), identity_of_file(&path));
+        let is_same = |other: &&Output| {
+            file.is_some() && file == other.file
+                || real.starts_with(&other.real)
+                || other.real.starts_with(&real)
+        };
+        let problem = if let Some(Output { shown: other, .. }) =
+            guarded.outputs.iter().find(is_same)
+        {
+            format!(
+                "{other} is the same file, or one lies in the other; choose another path for one of them"
+            )
+        } else if file.is_some() && file == stdin {
+            "it is also standard input; choose another file".to_owned()
+        } else {
+            guarded.outputs.push(Output { shown, real, file });
+            continue;
+        };
+        return Err(FileError::io(shown, "write it", io::Error::other(problem)));
     }
     *guard() = Some(guarded);
     Ok(())
@@ -142,12 +139,12 @@ pub fn open_input(path: impl AsRef<Path>) -> io::Result<File> {
 pub fn is_input(path: impl AsRef<Path>) -> io::Result<()> {
     let path = path.as_ref();
     let mut guard = guard();
-    let (Some(guard), Some(own)) = (guard.as_mut(), identity(path)) else { return Ok(()) };
+    let (Some(guard), Some(own)) = (guard.as_mut(), identity_of_file(path)) else { return Ok(()) };
     // Registered before the check, so that a caller who ignores the error still cannot overwrite
     // the file.
     guard.inputs.insert(own.clone(), path.to_owned());
-    match guard.outputs.iter().find(|(_, there)| there.as_ref() == Some(&own)) {
-        Some((shown, _)) => Err(io::Error::other(format!(
+    match guard.outputs.iter().find(|output| output.file.as_ref() == Some(&own)) {
+        Some(Output { shown, .. }) => Err(io::Error::other(format!(
             "{shown} would overwrite it, and the command reads it; choose another output file"
         ))),
         None => Ok(()),
@@ -156,15 +153,15 @@ pub fn is_input(path: impl AsRef<Path>) -> io::Result<()> {
 
 /// Permits that a file is overwritten after it was read, because the command updates it in place.
 pub fn rewrites(path: impl AsRef<Path>) {
-    if let (Some(guard), Some(own)) = (guard().as_mut(), identity(path.as_ref())) {
+    if let (Some(guard), Some(own)) = (guard().as_mut(), identity_of_file(path.as_ref())) {
         guard.inputs.remove(&own);
     }
 }
 
 /// Refuses to write a file that was read.
-pub(super) fn check_output(path: &Path, meta: &fs::Metadata) -> io::Result<()> {
+pub(super) fn check_output(path: &Path) -> io::Result<()> {
     let guard = guard();
-    let input = || guard.as_ref()?.inputs.get(&identity_of(path, meta)?);
+    let input = || guard.as_ref()?.inputs.get(&identity_of_file(path)?);
     match input() {
         Some(input) => Err(io::Error::other(format!(
             "this command reads {}; choose another output",

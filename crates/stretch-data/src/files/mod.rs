@@ -19,6 +19,7 @@ use std::{
     sync::{Mutex, PoisonError},
 };
 
+use crate::error::without_numbers;
 #[doc(hidden)]
 pub use draft::ask_before_disk_calls;
 pub use draft::{clean_up_and_exit, without_temporary_names};
@@ -33,7 +34,7 @@ pub use stream::is_standard_output;
 #[non_exhaustive]
 pub enum FileError {
     /// The system refused to open, read, write, or rename.
-    #[error("{path}: cannot {action}: {}", without_number(.cause))]
+    #[error("{path}: cannot {action}: {}", without_numbers(&.cause.to_string()))]
     Io {
         /// The file or folder.
         path: String,
@@ -60,12 +61,6 @@ impl FileError {
     fn exists(path: &Path) -> Self {
         Self::Exists { path: path.display().to_string() }
     }
-}
-
-/// Returns the text of a cause without Rust's `(os error 28)`.
-fn without_number(cause: &io::Error) -> String {
-    let text = cause.to_string();
-    text.split(" (os error").next().unwrap_or(&text).to_owned()
 }
 
 /// Largest file that is read in one piece, bytes. Calibration files, settings and diagnoses have

@@ -9,7 +9,7 @@ use std::{
 use super::{
     FileError,
     draft::{Draft, ask, sync},
-    folder::{check, complete},
+    folder::{check, complete, lock},
     inputs::check_output,
     is_standard_output,
     stream::open_stream,
@@ -148,12 +148,12 @@ impl Outputs {
             return written;
         }
         if let Some(meta) = &meta {
-            check_output(path, meta)?;
+            check_output(path)?;
             if meta.permissions().readonly() {
                 return Err(io::Error::other("it is read-only"));
             }
         }
-        let draft = Draft::file(path)?;
+        let draft = Draft::new(path, false)?;
         if self.0.iter().any(|other| other.real == draft.real) {
             return Err(io::Error::other(
                 "this command writes two files with that name; choose another name for one of them",
@@ -186,9 +186,10 @@ impl Outputs {
         let path = path.as_ref();
         let fail = |cause| FileError::io(path.display(), "write it", cause);
         check(path, force)?;
-        let mut draft = Draft::folder(path, force).map_err(fail)?;
+        let mut draft = Draft::new(path, true).map_err(fail)?;
+        draft.force = force;
         fill(&draft.temporary)?;
-        draft.lock();
+        draft.replaced = lock(&draft.real);
         complete(&draft.temporary, &draft.real).map_err(fail)?;
         self.0.push(draft);
         Ok(())

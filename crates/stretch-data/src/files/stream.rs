@@ -7,11 +7,7 @@ use std::{
 };
 
 const STDIN: [&str; 3] = ["/dev/stdin", "/dev/fd/0", "/proc/self/fd/0"];
-const STDOUT: [&str; 3] = ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
-
-fn is_one_of(path: &Path, names: [&str; 3]) -> bool {
-    cfg!(unix) && names.iter().any(|name| path == Path::new(name))
-}
+const STDOUT: [&str; 4] = ["-", "/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"];
 
 /// Whether an output path means standard output: `-`, `/dev/stdout`.
 ///
@@ -21,7 +17,7 @@ fn is_one_of(path: &Path, names: [&str; 3]) -> bool {
 /// assert!(!is_standard_output("out.csv"));
 /// ```
 pub fn is_standard_output(path: impl AsRef<Path>) -> bool {
-    path.as_ref().as_os_str() == "-" || is_one_of(path.as_ref(), STDOUT)
+    STDOUT.map(Path::new).contains(&path.as_ref())
 }
 
 /// Opens a target that takes bytes directly. Returns `None` if the path is a regular file or does
@@ -34,41 +30,36 @@ pub(super) fn open_stream(
     meta: Option<&Metadata>,
 ) -> io::Result<Option<Box<dyn Write>>> {
     if is_standard_output(path) {
-        return Ok(Some(Box::new(Stream { out: io::stdout(), has_gone: false })));
+        return Ok(Some(Box::new(Stream(io::stdout()))));
     }
-    if is_one_of(path, STDIN) {
+    if STDIN.map(Path::new).contains(&path) {
         return Err(io::Error::other("it is standard input, which cannot be written; name a file"));
     }
     let is_descriptor = path.starts_with("/dev/fd") || path.starts_with("/proc");
     match meta.filter(|meta| is_descriptor || !meta.is_file()) {
-        Some(meta) => Ok(Some(Box::new(Stream { out: open_device(path, meta)?, has_gone: false }))),
+        Some(meta) => Ok(Some(Box::new(Stream(open_device(path, meta)?)))),
         None => Ok(None),
     }
 }
 
 /// Standard output or a pipe. If its reader has closed it, as `head` does, the remaining bytes are
 /// discarded without an error, because the other outputs of the command are still wanted.
-struct Stream<W> {
-    out: W,
-    has_gone: bool,
-}
+struct Stream<W>(W);
 
-impl<W> Stream<W> {
-    fn let_go<T>(&mut self, done: io::Result<T>, instead: T) -> io::Result<T> {
-        self.has_gone |= done.as_ref().is_err_and(|e| e.kind() == io::ErrorKind::BrokenPipe);
-        if self.has_gone { Ok(instead) } else { done }
+fn unless_closed<T>(done: io::Result<T>, instead: T) -> io::Result<T> {
+    match done {
+        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(instead),
+        done => done,
     }
 }
 
 impl<W: Write> Write for Stream<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = if self.has_gone { Ok(0) } else { self.out.write(bytes) };
-        self.let_go(written, bytes.len())
+        unless_closed(self.0.write(bytes), bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        let flushed = if self.has_gone { Ok(()) } else { self.out.flush() };
-        self.let_go(flushed, ())
+        unless_closed(self.0.flush(), ())
     }
 }
 

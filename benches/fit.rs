@@ -41,8 +41,7 @@ fn surface(r: f64, v: f64) -> f64 {
 }
 
 fn streamed<const ROWS: usize>(log: &Log) -> [f64; 7] {
-    let mut sums =
-        SurfaceAccumulator::<f64, TERMS, ROWS>::new(Degree::POLY13).expect("seven terms");
+    let mut sums = SurfaceAccumulator::<f64, TERMS, ROWS>::of::<1, 3>();
     for ((&rate, &volts), &value) in log.rates.iter().zip(&log.volts).zip(&log.values) {
         sums.push(Sample { rate, volts, value }).expect("a finite sample");
     }
@@ -95,8 +94,7 @@ fn merges(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("merge_two_factors");
     let halves: [Factor<f64, TERMS>; 2] = [1.24, 1.26].map(|centre| {
         let log = log(10_000, centre, 0.02);
-        let mut sums =
-            SurfaceAccumulator::<f64, TERMS, 64>::new(Degree::POLY13).expect("seven terms");
+        let mut sums = SurfaceAccumulator::<f64, TERMS, 64>::of::<1, 3>();
         for ((&rate, &volts), &value) in log.rates.iter().zip(&log.volts).zip(&log.values) {
             sums.push(Sample { rate, volts, value }).expect("a finite sample");
         }

@@ -75,7 +75,7 @@ fn calibrate(
         let rates: Vec<f64> = rows.iter().map(|row| row.rate).collect();
         let volts: Vec<f64> = rows.iter().map(|row| row.volts).collect();
         let (rate_range, volts_range) = (range(0.0, &rates)?, range(0.0, &volts)?);
-        let mut sums = SurfaceAccumulator::<f64>::new(Degree::POLY13)?;
+        let mut sums = SurfaceAccumulator::<f64>::new(Degree::POLY13);
         for row in rows {
             sums.push(Sample {
                 rate: rate_range.normalise(row.rate),

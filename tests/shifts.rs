@@ -95,7 +95,7 @@ fn volts_per_mm(trial: &Trial, k: usize) -> f64 {
     let volts = trial.channel(&name(k)).expect("recorded");
     // The fields are exchanged, because the voltage is regressed on the length.
     let row = |(&length, &volts)| Sample { rate: 0.0, volts: length, value: volts };
-    let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE).expect("room for a line");
+    let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE);
     line.extend(length.iter().zip(volts).map(row)).expect("numbers");
     line.fit().expect("the length moves").coefficients()[1]
 }

@@ -17,7 +17,7 @@ fn trial(number: u64) -> Result<Factor<f64>, FitError> {
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (state >> 11) as f64 / (1_u64 << 53) as f64
     };
-    let mut sums = SurfaceAccumulator::<f64>::new(OrderTable::<f64>::covering(Degree::POLY13))?;
+    let mut sums = SurfaceAccumulator::<f64>::new(OrderTable::<f64>::covering(Degree::POLY13));
     for _ in 0..1000 {
         let (rate, volts) = (uniform(), uniform());
         let noise = NOISE * ((0..12).map(|_| uniform()).sum::<f64>() - 6.0);

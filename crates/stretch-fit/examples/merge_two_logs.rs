@@ -18,10 +18,10 @@ fn sample(k: u32) -> Sample<f64> {
 }
 
 fn main() -> Result<(), FitError> {
-    let mut whole = Log::new(Degree::POLY13)?;
+    let mut whole = Log::of::<1, 3>();
     whole.extend((0..2000).map(sample))?;
 
-    let (mut first, mut second) = (Log::new(Degree::POLY13)?, Log::new(Degree::POLY13)?);
+    let (mut first, mut second) = (Log::of::<1, 3>(), Log::of::<1, 3>());
     first.extend((0..700).map(sample))?;
     second.extend((700..2000).map(sample))?;
     second.merge(&first)?; // in either order

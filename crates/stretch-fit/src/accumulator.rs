@@ -12,8 +12,8 @@ use crate::{
 /// Samples collect in a block of `ROWS`. A full block is folded into the triangular [`Factor`] by Householder
 /// reflections. Memory is `TERMS^2 + (TERMS + 4) ROWS` numbers for a log of any length.
 ///
-/// - `TERMS`: largest number of terms. The default is enough for any degree. If memory is scarce, use the number of
-///   the degree, such as `{ Degree::POLY13.terms() }`.
+/// - `TERMS`: number of terms for which there is memory. The default is enough for any degree ([`new`](Self::new)). If
+///   memory is scarce, use the number of the degree, such as `{ Degree::POLY13.terms() }` ([`of`](Self::of)).
 /// - `ROWS`: 64 to 256 on a computer (128 is fastest for poly13), 8 to 16 on a microcontroller. It affects speed and
 ///   memory. It affects results only by rounding, which grows with the number of blocks: below 8 rows, logs of more
 ///   than 1e5 samples lose a digit or two, and dependent terms may not be detected.
@@ -25,7 +25,7 @@ use crate::{
 /// use stretch_core::Degree;
 /// use stretch_fit::{Sample, SurfaceAccumulator};
 ///
-/// let mut log = SurfaceAccumulator::<f64>::new(Degree::POLY13)?;
+/// let mut log = SurfaceAccumulator::<f64>::new(Degree::POLY13);
 /// for k in 0..200 {
 ///     let (rate, volts) = (f64::from(k % 7) - 3.0, f64::from(k % 31) / 30.0);
 ///     log.push(Sample { rate, volts, value: 0.25 + 0.5 * volts - 0.125 * rate * volts })?;
@@ -48,17 +48,43 @@ pub struct SurfaceAccumulator<T, const TERMS: usize = MAX_TERMS, const ROWS: usi
     most_value: T,
 }
 
-impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS, ROWS> {
-    const SHAPE: () = assert!(ROWS > 0 && TERMS > 0, "a block needs a row and a term");
+impl<T: Real, const ROWS: usize> SurfaceAccumulator<T, MAX_TERMS, ROWS> {
+    /// Creates an accumulator without samples, for a surface of any degree.
+    pub fn new(degree: Degree) -> Self {
+        Self::empty(Basis::new(degree))
+    }
+}
 
-    /// Creates an accumulator without samples, for a surface of `degree`.
+impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS, ROWS> {
+    /// Creates an accumulator without samples, for a surface of degree `RATE` in the rate and `VOLTS` in the voltage. It
+    /// does not compile unless that surface has `TERMS` terms.
     ///
-    /// # Errors
-    /// [`FitError::TooManyTerms`] if the degree has more than `TERMS` terms.
-    pub fn new(degree: Degree) -> Result<Self, FitError> {
-        let () = Self::SHAPE;
-        let basis = Basis::new(degree)?;
-        Ok(Self {
+    /// ```
+    /// use stretch_core::Degree;
+    /// use stretch_fit::SurfaceAccumulator;
+    ///
+    /// type Poly13 = SurfaceAccumulator<f32, { Degree::POLY13.terms() }, 8>;
+    /// assert_eq!(Poly13::of::<1, 3>().degree(), Degree::POLY13);
+    /// assert!(size_of::<Poly13>() < 700, "bytes");
+    /// ```
+    ///
+    /// ```compile_fail
+    /// # use stretch_fit::SurfaceAccumulator;
+    /// let line = SurfaceAccumulator::<f32, 7, 8>::of::<0, 1>();
+    /// ```
+    pub fn of<const RATE: u8, const VOLTS: u8>() -> Self {
+        let degree = const {
+            match Degree::new(RATE, VOLTS) {
+                Ok(degree) if degree.terms() == TERMS => degree,
+                _ => panic!("TERMS must be the number of terms of the degree"),
+            }
+        };
+        Self::empty(Basis::new(degree))
+    }
+
+    fn empty(basis: Basis<TERMS>) -> Self {
+        const { assert!(ROWS > 0, "a block needs a row") };
+        Self {
             factor: Factor::empty(basis),
             filled: 0,
             root_weights: [T::zero(); ROWS],
@@ -68,7 +94,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
             block: [[T::zero(); ROWS]; TERMS],
             most_input: basis.most(),
             most_value: power_of_two(entry_exponent::<T>()),
-        })
+        }
     }
 
     /// Adds a sample.
@@ -163,7 +189,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// use stretch_core::Degree;
     /// use stretch_fit::{FitError, SurfaceAccumulator};
     ///
-    /// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE)?;
+    /// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE);
     /// line.push_columns(&[0.0; 3], &[0.0, 1.0, 2.0], &[1.0, 3.0, 5.0])?;
     /// approx::assert_abs_diff_eq!(line.fit()?.coefficients()[1], 2.0, epsilon = 1e-12);
     /// assert!(line.push_columns(&[0.0; 2], &[0.0; 2], &[1.0, f64::NAN]).is_err());
@@ -243,7 +269,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// use stretch_core::Degree;
     /// use stretch_fit::{Sample, SurfaceAccumulator};
     ///
-    /// let mut block = SurfaceAccumulator::<f64>::new(Degree::LINE)?;
+    /// let mut block = SurfaceAccumulator::<f64>::new(Degree::LINE);
     /// let empty = block.factor();
     /// let samples = [(0.0, 1.0), (1.0, 3.0)];
     /// block.extend(samples.map(|(volts, value)| Sample { rate: 0.0, volts, value }))?;

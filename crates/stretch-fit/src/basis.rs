@@ -2,8 +2,6 @@
 
 use stretch_core::{Degree, Real};
 
-use crate::FitError;
-
 /// Returns the powers of each term as an array, because iterating over an array is faster than
 /// computing the powers.
 pub(crate) fn exponents<const TERMS: usize>(degree: Degree) -> [(u8, u8); TERMS] {
@@ -29,11 +27,9 @@ pub(crate) struct Basis<const TERMS: usize> {
 }
 
 impl<const TERMS: usize> Basis<TERMS> {
-    pub(crate) fn new(degree: Degree) -> Result<Self, FitError> {
-        let terms = degree.terms();
-        if terms > TERMS {
-            return Err(FitError::TooManyTerms { terms, room: TERMS });
-        }
+    /// Creates the table of a degree, which has at most `TERMS` terms.
+    pub(crate) fn new(degree: Degree) -> Self {
+        let terms = degree.terms().min(TERMS);
         // each term is an earlier term, times the rate or the voltage
         let powers = exponents::<TERMS>(degree);
         let mut steps = [(0, false); TERMS];
@@ -44,7 +40,7 @@ impl<const TERMS: usize> Basis<TERMS> {
             let parent = powers[..k].iter().position(|&term| term == lower);
             steps[k] = (parent.unwrap_or(0) as u8, by_volts);
         }
-        Ok(Self { degree, steps })
+        Self { degree, steps }
     }
 
     pub(crate) fn degree(&self) -> Degree {

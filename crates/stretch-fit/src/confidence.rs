@@ -41,7 +41,7 @@ pub struct Bounds<T> {
 /// use stretch_fit::{Sample, SurfaceAccumulator};
 ///
 /// let samples = [(0.0, 1.0), (1.0, 3.0), (2.0, 4.0)];
-/// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE)?;
+/// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE);
 /// line.extend(samples.map(|(volts, value)| Sample { rate: 0.0, volts, value }))?;
 /// let fit = line.fit()?;
 /// let bounds = fit.confidence(0.95)?;

@@ -125,7 +125,7 @@ pub struct CrossValidation<T> {
 ///
 /// // Three trials; the last sensor reading is 0.1 too high throughout.
 /// let trials = [0.0, 0.0, 0.1].map(|offset| {
-///     let mut trial = SurfaceAccumulator::<f64>::new(Degree::LINE).unwrap();
+///     let mut trial = SurfaceAccumulator::<f64>::new(Degree::LINE);
 ///     for k in 0..50 {
 ///         let volts = f64::from(k) / 50.0;
 ///         trial.push(Sample { rate: 0.0, volts, value: 2.0 * volts + offset }).unwrap();

@@ -65,7 +65,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     /// use stretch_fit::{Factor, FitError, Sample, SurfaceAccumulator};
     ///
     /// let samples = [(0.0, 1.0), (1.0, 3.0), (2.0, 4.0)];
-    /// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE)?;
+    /// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE);
     /// line.extend(samples.map(|(volts, value)| Sample { rate: 0.0, volts, value }))?;
     /// let spec = line.factor().spec();
     /// assert_eq!(Factor::new(spec)?, line.factor());
@@ -76,8 +76,11 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     pub fn new(spec: FactorSpec<T, TERMS>) -> Result<Self, FitError> {
         let FactorSpec { degree, centre, r, q, residual, residual_rounding, samples, folds } = spec;
         let residual = (residual, residual_rounding);
-        let mut factor = Self::empty(Basis::new(degree)?);
-        let terms = factor.basis.terms();
+        let terms = degree.terms();
+        if terms > TERMS {
+            return Err(FitError::TooManyTerms { terms, room: TERMS });
+        }
+        let mut factor = Self::empty(Basis::new(degree));
         let mut sound = centre.is_finite() && residual.0.is_finite() && residual.1.is_finite();
         for row in 0..terms {
             for column in row..terms {
@@ -242,13 +245,14 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         if degree == self.degree() {
             return Ok(*self);
         }
-        let mut lower = Self::empty(Basis::new(degree)?);
+        let mut lower = Self::empty(Basis::new(degree));
         lower.centre = self.centre;
         let terms = self.basis.terms();
         let mut block = [[T::zero(); TERMS]; TERMS];
-        for (column, (rate_power, volts_power)) in block.iter_mut().zip(degree.exponents()) {
+        for (k, (rate_power, volts_power)) in degree.exponents().enumerate() {
             let from = position(self.degree(), (rate_power, volts_power))
                 .ok_or(FitError::MissingTerm { rate_power, volts_power })?;
+            let Some(column) = block.get_mut(k) else { continue };
             for (entry, row) in column.iter_mut().zip(&self.r[..=from.min(terms)]) {
                 *entry = row[from];
             }

@@ -21,7 +21,7 @@ use crate::{
 /// use stretch_core::Degree;
 /// use stretch_fit::{Sample, SurfaceAccumulator};
 ///
-/// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE)?;
+/// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE);
 /// for (volts, value) in [(0.0, 1.0), (1.0, 3.0), (2.0, 4.0)] {
 ///     line.push(Sample { rate: 0.0, volts, value })?;
 /// }

@@ -56,7 +56,7 @@ pub type OrderEntry<T> = (Degree, Result<OrderRow<T>, FitError>);
 /// // The truth is quadratic in the voltage; the error differs from trial to trial.
 /// let trials = [1, 2, 3, 4].map(|trial| {
 ///     let covering = OrderTable::<f64>::covering(Degree::POLY13);
-///     let mut sums = SurfaceAccumulator::<f64>::new(covering).unwrap();
+///     let mut sums = SurfaceAccumulator::<f64>::new(covering);
 ///     for k in 0..300 {
 ///         let (rate, volts) = (f64::from(k % 17) / 8.0 - 1.0, f64::from(k % 41) / 20.0 - 1.0);
 ///         let noise = 0.05 * f64::from(k * k * trial % 23 - 11) / 11.0;
@@ -121,7 +121,7 @@ impl<T: Real> OrderTable<T> {
     ///
     /// // a weight and a reading a trial; the sensor is quadratic
     /// let trial = |k: u32| {
-    ///     let mut sums = SurfaceAccumulator::<f64>::new(Degree::new(0, 5).unwrap()).unwrap();
+    ///     let mut sums = SurfaceAccumulator::<f64>::new(Degree::new(0, 5).unwrap());
     ///     let (volts, noise) = (f64::from(k), 0.1 * (f64::from(7 * k * k % 11) - 5.0));
     ///     sums.push(Sample { rate: 0.0, volts, value: volts + 0.3 * volts * volts + noise }).unwrap();
     ///     sums.factor()

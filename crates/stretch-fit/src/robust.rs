@@ -41,10 +41,10 @@ impl Loss {
 
 /// A robust fit with its scale and the outcome of the iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RobustFit<T, const TERMS: usize = MAX_TERMS> {
+pub struct RobustFit<T> {
     /// The fit. SSE, R^2 and RMSE weigh all samples equally, including outliers. `sigma`, standard
     /// errors and bounds use the robust scale.
-    pub fit: Fit<T, TERMS>,
+    pub fit: Fit<T>,
     /// Number of re-weighted fits.
     pub steps: u32,
     /// Whether the coefficients converged within the limit of steps.
@@ -87,7 +87,7 @@ pub struct RobustFit<T, const TERMS: usize = MAX_TERMS> {
 /// });
 /// let mut memory = [0.0; 100];
 /// for loss in [Loss::Bisquare, Loss::LeastAbsolute] {
-///     let robust = robust_fit::<f64, 2, _>(Degree::LINE, loss, samples, &mut memory)?;
+///     let robust = robust_fit(Degree::LINE, loss, samples, &mut memory)?;
 ///     assert!(robust.converged);
 ///     approx::assert_abs_diff_eq!(robust.fit.coefficients()[1], 3.0, epsilon = 0.02);
 /// }
@@ -99,16 +99,16 @@ pub struct RobustFit<T, const TERMS: usize = MAX_TERMS> {
 /// if `memory` is shorter than the number of samples; [`FitError::TooFewSamples`] if no degree of
 /// freedom is left; [`FitError::RankDeficient`] also if the samples with non-zero weight cannot
 /// determine a term.
-pub fn robust_fit<T: Real, const TERMS: usize, I>(
+pub fn robust_fit<T: Real, I>(
     degree: Degree,
     loss: Loss,
     samples: impl Fn() -> I,
     memory: &mut [T],
-) -> Result<RobustFit<T, TERMS>, FitError>
+) -> Result<RobustFit<T>, FitError>
 where
     I: IntoIterator<Item = Sample<T>>,
 {
-    let mut plain = SurfaceAccumulator::<T, TERMS, ROWS>::new(degree)?;
+    let mut plain = SurfaceAccumulator::<T, MAX_TERMS, ROWS>::new(degree);
     plain.extend(samples())?;
     let plain = plain.factor();
     let ols = plain.fit()?;
@@ -131,7 +131,7 @@ where
     // deviation.
     let spread = (ols.sst / T::from_f64((n - 1) as f64)).sqrt();
     let tiny = T::from_f64(1e-6) * if spread > T::zero() { spread } else { T::one() };
-    let scale_of = |fit: &Fit<T, TERMS>, residuals: &mut [T]| {
+    let scale_of = |fit: &Fit<T>, residuals: &mut [T]| {
         for (Sample { rate, volts, value }, place) in samples().into_iter().zip(&mut *residuals) {
             let e = value - fit.surface.eval(rate, volts);
             *place = (e * studentising(rate, volts)).abs();
@@ -152,7 +152,7 @@ where
             Loss::Bisquare => T::from_f64(TUNING) * scale_of(&found, residuals).max(tiny),
             Loss::LeastAbsolute => (T::from_f64(1e-6) * scale_of(&found, residuals)).max(rounding),
         };
-        let mut sums = SurfaceAccumulator::<T, TERMS, ROWS>::new(degree)?;
+        let mut sums = SurfaceAccumulator::<T, MAX_TERMS, ROWS>::new(degree);
         for sample in samples() {
             let Sample { rate, volts, value } = sample;
             let e = (value - found.surface.eval(rate, volts)) * studentising(rate, volts);
@@ -241,11 +241,7 @@ fn order_statistic<T: Real>(values: &mut [T], place: usize) -> T {
 
 /// Computes the robust sigma from `psi(u) = u (1 - u^2)^2` and its derivative, with the
 /// small-sample factor `1 + (p/n)(1 - m)/m`, where m is the mean of the derivative.
-fn bisquare_sigma<T: Real, const TERMS: usize>(
-    studentised: impl Iterator<Item = (T, T)>,
-    reach: T,
-    ols: &Fit<T, TERMS>,
-) -> T {
+fn bisquare_sigma<T: Real>(studentised: impl Iterator<Item = (T, T)>, reach: T, ols: &Fit<T>) -> T {
     let (mut slope, mut square) = (T::zero(), T::zero());
     for (u, h) in studentised {
         let root = T::one() - u * u;

@@ -26,7 +26,7 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
     /// ```
     /// use stretch_core::Degree;
     /// use stretch_fit::{Sample, SurfaceAccumulator};
-    /// let line = SurfaceAccumulator::<f64, { Degree::LINE.terms() }>::new(Degree::LINE)?;
+    /// let line = SurfaceAccumulator::<f64, { Degree::LINE.terms() }>::of::<0, 1>();
     /// let mut parts = [line.clone(), line];
     /// for k in 0..40_u32 {
     ///     let volts = 1.0 + f64::from(k % 20) / 20.0;

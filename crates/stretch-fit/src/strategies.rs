@@ -7,7 +7,7 @@
 //!
 //! let config = ProptestConfig { cases: 8, failure_persistence: None, ..Default::default() };
 //! proptest!(config, |(log in observations(Degree::POLY13, 0.0, 50..200))| {
-//!     let mut sums = SurfaceAccumulator::<f64>::new(log.surface.degree())?;
+//!     let mut sums = SurfaceAccumulator::<f64>::new(log.surface.degree());
 //!     sums.extend(log.samples.iter().copied())?;
 //!     let fit = sums.fit()?;
 //!     prop_assert!(fit.rmse().unwrap() < 1e-10);

@@ -21,7 +21,7 @@ fn points(samples: u32, centre: f64, width: f64) -> impl Iterator<Item = (f64, f
 }
 
 fn error<T: Real, const ROWS: usize>(samples: u32, centre: f64, width: f64) -> (f64, f64) {
-    let mut sums = SurfaceAccumulator::<T, 7, ROWS>::new(Degree::POLY13).unwrap();
+    let mut sums = SurfaceAccumulator::<T, 7, ROWS>::of::<1, 3>();
     for (rate, volts) in points(samples, centre, width) {
         let (rate, volts) = (T::from_f64(rate), T::from_f64(volts));
         // The value is computed from the inputs after rounding to the type.
@@ -83,12 +83,12 @@ fn bounds_hold_the_truth_as_often_as_they_say() {
                 Sample { rate, volts, value: surface(rate, volts) + 0.1 * normal }
             })
             .collect();
-        let mut sums = SurfaceAccumulator::<f64, 7, 32>::new(Degree::POLY13).unwrap();
+        let mut sums = SurfaceAccumulator::<f64, 21, 32>::new(Degree::POLY13);
         sums.extend(samples.iter().copied()).unwrap();
         let mut memory = [0.0; 150];
         let mut robust = |loss| {
             let again = || samples.iter().copied();
-            robust_fit::<f64, 7, _>(Degree::POLY13, loss, again, &mut memory).unwrap().fit
+            robust_fit(Degree::POLY13, loss, again, &mut memory).unwrap().fit
         };
         let fits = [sums.fit().unwrap(), robust(Loss::Bisquare), robust(Loss::LeastAbsolute)];
         for (fit, held) in fits.iter().zip(&mut held) {
@@ -118,7 +118,7 @@ fn stated_and_found(offset: f64, half: f64, cubic: Degree) -> Option<(f64, f64)>
             value: 50.0 + 40.0 * x + 9.0 * x * x - 11.0 * x * x * x,
         }
     };
-    let mut sums = SurfaceAccumulator::<f64>::new(cubic).unwrap();
+    let mut sums = SurfaceAccumulator::<f64>::new(cubic);
     sums.extend((0..2010).map(sample)).unwrap();
     let fit = match sums.fit() {
         Ok(fit) => fit,
@@ -147,7 +147,7 @@ fn the_error_that_a_fit_states_is_that_of_its_surface() {
     assert!(stated_and_found(100.0, 1.0, cubic).is_some());
     // with the origin in the middle, no digits are lost
     let line = |k: u32| Sample { rate: 0.0, volts: 8.3e6 + f64::from(k), value: f64::from(k * k) };
-    let mut sums = SurfaceAccumulator::<f64>::new(cubic).unwrap();
+    let mut sums = SurfaceAccumulator::<f64>::new(cubic);
     sums.extend((0..200).map(line)).unwrap();
     assert!(sums.fit().is_err());
     let about = sums.factor().counted_from(8.3e6 + 100.0).fit().unwrap();

@@ -12,7 +12,7 @@ use testkit::tolerance as tol;
 type Sample = stretch_fit::Sample<f64>;
 
 fn folded<const ROWS: usize>(degree: Degree, samples: &[Sample]) -> Factor<f64, 21> {
-    let mut sums = SurfaceAccumulator::<f64, 21, ROWS>::new(degree).unwrap();
+    let mut sums = SurfaceAccumulator::<f64, 21, ROWS>::new(degree);
     sums.extend(samples.iter().copied()).unwrap();
     sums.factor()
 }
@@ -119,7 +119,7 @@ proptest! {
         log in observations(Degree::POLY13, 0.5, 60..150),
         weights in prop::collection::vec(1e-3..1e3f64, 150),
     ) {
-        let mut sums = SurfaceAccumulator::<f64, 21, 16>::new(Degree::POLY13).unwrap();
+        let mut sums = SurfaceAccumulator::<f64, 21, 16>::new(Degree::POLY13);
         for (&sample, &weight) in log.samples.iter().zip(&weights) {
             sums.push_weighted(sample, weight).unwrap();
         }

@@ -15,7 +15,7 @@ fn accumulate<const ROWS: usize>(
     degree: Degree,
     samples: &[Sample],
 ) -> SurfaceAccumulator<f64, 21, ROWS> {
-    let mut sums = SurfaceAccumulator::new(degree).unwrap();
+    let mut sums = SurfaceAccumulator::new(degree);
     sums.extend(samples.iter().copied()).unwrap();
     sums
 }
@@ -54,7 +54,7 @@ proptest! {
         log in observations(Degree::POLY13, 0.5, 1..200),
         cut in 0.0..1.0_f64,
     ) {
-        let mut columns: SurfaceAccumulator<f64, 21, 16> = SurfaceAccumulator::new(Degree::POLY13).unwrap();
+        let mut columns: SurfaceAccumulator<f64, 21, 16> = SurfaceAccumulator::new(Degree::POLY13);
         let (before, after) = log.samples.split_at((cut * log.samples.len() as f64) as usize);
         for part in [before, after] {
             let column = |of: fn(&Sample) -> f64| part.iter().map(of).collect::<Vec<f64>>();
@@ -81,7 +81,7 @@ proptest! {
         let parts = [&log.samples[..low], &log.samples[low..high], &log.samples[high..]];
         let whole = accumulate::<16>(Degree::POLY13, &log.samples).fit().unwrap();
 
-        let mut merged = SurfaceAccumulator::<f64, 21, 16>::new(Degree::POLY13).unwrap();
+        let mut merged = SurfaceAccumulator::<f64, 21, 16>::new(Degree::POLY13);
         let mut factor: Factor<f64, 21> = merged.factor();
         for part in order {
             let part = accumulate::<16>(Degree::POLY13, parts[part]);
@@ -164,7 +164,7 @@ proptest! {
         log in observations(Degree::POLY13, 0.5, 30..80),
         weights in prop::collection::vec(0..4_u8, 80),
     ) {
-        let mut weighted = SurfaceAccumulator::<f64, 21, 16>::new(Degree::POLY13).unwrap();
+        let mut weighted = SurfaceAccumulator::<f64, 21, 16>::new(Degree::POLY13);
         let mut repeated = weighted.clone();
         for (&sample, &weight) in log.samples.iter().zip(&weights) {
             weighted.push_weighted(sample, weight.into()).unwrap();
@@ -300,7 +300,7 @@ proptest! {
         });
         let mut memory = vec![0.0; n];
         let absolute =
-            robust_fit::<f64, 7, _>(Degree::POLY13, Loss::LeastAbsolute, spoilt, &mut memory);
+            robust_fit(Degree::POLY13, Loss::LeastAbsolute, spoilt, &mut memory);
         let surface = absolute.unwrap().fit.surface();
         for &Sample { rate, volts, .. } in &log.samples {
             let (found, truth) = (surface.eval(rate, volts), log.surface.eval(rate, volts));
@@ -314,7 +314,7 @@ proptest! {
         let mut memory = vec![0.0; log.samples.len()];
         let again = || log.samples.iter().copied();
         for loss in [Loss::Bisquare, Loss::LeastAbsolute] {
-            let robust = robust_fit::<f64, 7, _>(Degree::POLY13, loss, again, &mut memory).unwrap();
+            let robust = robust_fit(Degree::POLY13, loss, again, &mut memory).unwrap();
             prop_assert!(robust.converged && robust.rejected == 0);
             let off = distance(robust.fit.coefficients(), &log.surface.coefficients()[..7]);
             prop_assert!(off < tol::FIT_WELL * 10.0, "off by {off:e}");
@@ -329,7 +329,7 @@ fn finite_or_refused<T: Real>(
     samples: &[(f64, f64, f64, f64)],
     scale: f64,
 ) -> Result<(), TestCaseError> {
-    let mut gross = SurfaceAccumulator::<T, 21, 8>::new(degree).unwrap();
+    let mut gross = SurfaceAccumulator::<T, 21, 8>::new(degree);
     let mut tame = gross.clone();
     for (k, &(rate, volts, value, weight)) in samples.iter().enumerate() {
         let [r, v, z, w] = [rate, volts, value, weight.abs()].map(T::from_f64);
@@ -363,7 +363,7 @@ fn finite_or_refused<T: Real>(
 
 /// Returns the factor of trial number `k`, which has its own noise.
 fn trial(k: u32, degree: Degree, truth: impl Fn(f64, f64) -> f64) -> Factor<f64, 21> {
-    let mut sums = SurfaceAccumulator::<f64, 21, 32>::new(degree).unwrap();
+    let mut sums = SurfaceAccumulator::<f64, 21, 32>::new(degree);
     let mut state = u64::from(k) * 2_654_435_761 + 1;
     let mut uniform = || {
         state =

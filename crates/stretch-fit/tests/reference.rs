@@ -12,7 +12,7 @@ type Columns = HashMap<String, Vec<f64>>;
 const CASES: [&str; 2] = ["fit/well.csv", "fit/ill.csv"];
 
 fn accumulate(samples: &Columns, degree: Degree, weighted: bool) -> Factor<f64, 21> {
-    let mut sums = SurfaceAccumulator::<f64, 21, 64>::new(degree).unwrap();
+    let mut sums = SurfaceAccumulator::<f64, 21, 64>::new(degree);
     for (k, &rate) in samples["rate"].iter().enumerate() {
         let [volts, value, weight] = ["volts", "value", "weight"].map(|name| samples[name][k]);
         let weight = if weighted { weight } else { 1.0 };
@@ -144,8 +144,7 @@ fn robust_fits() {
         xy.map(|((&rate, &volts), &value)| Sample { rate, volts, value })
     };
     let mut memory = vec![0.0; samples["rate"].len()];
-    let mut fitted =
-        |loss| robust_fit::<f64, 7, _>(Degree::POLY13, loss, points, &mut memory).unwrap();
+    let mut fitted = |loss| robust_fit(Degree::POLY13, loss, points, &mut memory).unwrap();
 
     let bisquare = fitted(Loss::Bisquare);
     assert!(bisquare.converged);

@@ -9,14 +9,14 @@ use testkit::tolerance::F64_ROUNDING;
 
 /// Accumulates values at the volts 0, 1, 2 ... for a line.
 fn line(values: impl IntoIterator<Item = f64>) -> SurfaceAccumulator<f64, 2> {
-    let mut sums = SurfaceAccumulator::new(Degree::LINE).unwrap();
+    let mut sums = SurfaceAccumulator::of::<0, 1>();
     let sample = |(k, value): (u32, f64)| Sample { rate: 0.0, volts: f64::from(k), value };
     sums.extend((0..).zip(values).map(sample)).unwrap();
     sums
 }
 
 fn poly13() -> SurfaceAccumulator<f64, 7, 16> {
-    SurfaceAccumulator::new(Degree::POLY13).unwrap()
+    SurfaceAccumulator::of::<1, 3>()
 }
 
 #[test]
@@ -50,7 +50,7 @@ fn the_term_that_the_data_cannot_determine_is_named() {
 /// Returns the error of a fit to volts that are a linear function of the rate, so that p01 depends
 /// on p00 and p10.
 fn dependent<T: Real, const ROWS: usize>(samples: u32, offset: f64) -> FitError {
-    let mut sums = SurfaceAccumulator::<T, 7, ROWS>::new(Degree::POLY13).unwrap();
+    let mut sums = SurfaceAccumulator::<T, 7, ROWS>::of::<1, 3>();
     for k in 0..samples {
         let rate = (f64::from(k) * 0.618_033_988_749).fract();
         let (rate, volts) = (T::from_f64(rate), T::from_f64(offset + 3.0 * rate));
@@ -128,10 +128,12 @@ fn a_sample_without_weight_is_not_counted() {
 
 #[test]
 fn degrees_must_have_room_and_agree() {
-    let room = SurfaceAccumulator::<f64, 7, 8>::new(Degree::new(2, 3).unwrap()).unwrap_err();
-    assert_eq!(room, FitError::TooManyTerms { terms: 9, room: 7 });
-    let mut sums = SurfaceAccumulator::<f64, 7, 8>::new(Degree::POLY13).unwrap();
-    let other = SurfaceAccumulator::new(Degree::new(1, 2).unwrap()).unwrap();
+    let mut sums = SurfaceAccumulator::<f64>::new(Degree::POLY13);
+    let other = SurfaceAccumulator::new(Degree::new(1, 2).unwrap());
+    let damaged = FactorSpec { degree: Degree::new(2, 3).unwrap(), ..poly13().factor().spec() };
+    let room = FitError::TooManyTerms { terms: 9, room: 7 };
+    assert_eq!(stretch_fit::Factor::new(damaged), Err(room));
+    assert!(poly13().factor().restrict(damaged.degree).is_err());
     let missing = FitError::MissingTerm { rate_power: 1, volts_power: 2 };
     assert_eq!(sums.merge(&other).unwrap_err(), missing);
     assert_eq!(other.factor().fit_degree(Degree::POLY13).unwrap_err(), missing);
@@ -160,9 +162,9 @@ fn robust_fits_need_memory_and_a_degree_of_freedom() {
     let samples = |n: u32| move || (0..n).map(sample);
     let line = Degree::LINE;
     let mut memory = [0.0; 9];
-    let short = robust_fit::<f64, 2, _>(line, Loss::Bisquare, samples(10), &mut memory);
+    let short = robust_fit(line, Loss::Bisquare, samples(10), &mut memory);
     assert_eq!(short.unwrap_err(), FitError::ShortMemory { needed: 10, got: 9 });
-    let few = robust_fit::<f64, 2, _>(line, Loss::Bisquare, samples(2), &mut memory);
+    let few = robust_fit(line, Loss::Bisquare, samples(2), &mut memory);
     assert_eq!(few.unwrap_err(), FitError::TooFewSamples { needed: 3, got: 2 });
 }
 

@@ -144,10 +144,8 @@ fn plain(rows: usize) {
     let mut shortest = f64::INFINITY;
     for _ in 0..TIMES {
         let begin = Instant::now();
-        let mut sides = [(); 2].map(|()| {
-            SurfaceAccumulator::<f64, { Degree::POLY13.terms() }>::new(Degree::POLY13)
-                .expect("seven terms")
-        });
+        let mut sides =
+            [(); 2].map(|()| SurfaceAccumulator::<f64, { Degree::POLY13.terms() }>::of::<1, 3>());
         for &[rate, volts, value] in &numbers {
             let side = &mut sides[usize::from(rate < 0.0)];
             side.push(Sample { rate, volts, value }).expect("finite numbers");

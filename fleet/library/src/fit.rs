@@ -7,7 +7,7 @@ use datafusion::{
         array::{ArrayRef, BinaryBuilder, BooleanArray},
         datatypes::{DataType, Field, FieldRef},
     },
-    common::{Result, cast::as_float64_array, plan_datafusion_err},
+    common::{Result, cast::as_float64_array},
     logical_expr::{
         Accumulator, AggregateUDF, AggregateUDFImpl, EmitTo, GroupsAccumulator, Signature,
         TypeSignature, Volatility,
@@ -15,13 +15,14 @@ use datafusion::{
     },
 };
 use stretch_core::Degree;
+use stretch_fit::SurfaceAccumulator;
 
 use crate::{
     about::About,
     answer::{answers, fields},
     one::{One, state_of_each_row, states},
     state::Outcome,
-    triangles::Triangles,
+    triangles::{ROWS, Triangles},
 };
 
 /// Numbers of terms of the fits.
@@ -76,14 +77,16 @@ pub(crate) fn functions() -> impl Iterator<Item = Arc<AggregateUDF>> {
 impl Function {
     fn groups(&self, args: &AccumulatorArgs) -> Result<Box<dyn GroupsAccumulator + Sync>> {
         Ok(match self.kind {
-            Kind::Line => Box::new(self.fits::<LINE>(Degree::LINE, args)?),
-            _ => Box::new(self.fits::<POLY13>(Degree::POLY13, args)?),
+            Kind::Line => {
+                Box::new(self.fits(SurfaceAccumulator::<_, LINE, _>::of::<0, 1>(), args)?)
+            }
+            _ => Box::new(self.fits(SurfaceAccumulator::<_, POLY13, _>::of::<1, 3>(), args)?),
         })
     }
 
     fn fits<const TERMS: usize>(
         &self,
-        degree: Degree,
+        block: SurfaceAccumulator<f64, TERMS, ROWS>,
         args: &AccumulatorArgs,
     ) -> Result<Fits<TERMS>> {
         let about = match self.kind {
@@ -91,9 +94,7 @@ impl Function {
             _ => About::new(args.expr_fields)?,
         };
         let sides = if self.kind == Kind::Line { 1 } else { 2 };
-        let triangles = Triangles::new(degree, sides, &about)
-            .map_err(|error| plan_datafusion_err!("{}: {error}", self.kind.name()))?;
-        Ok(Fits { kind: self.kind, triangles })
+        Ok(Fits { kind: self.kind, triangles: Triangles::new(block, sides, &about) })
     }
 }
 

@@ -63,18 +63,21 @@ pub(crate) struct Triangles<const TERMS: usize> {
 
 impl<const TERMS: usize> Triangles<TERMS> {
     /// Creates fits without any group, for a line (one side) or a surface per branch (two sides).
-    pub(crate) fn new(degree: Degree, sides: usize, about: &About) -> Result<Self, FitError> {
-        let block = Box::new(SurfaceAccumulator::new(degree)?);
-        Ok(Self {
-            degree,
+    pub(crate) fn new(
+        block: SurfaceAccumulator<f64, TERMS, ROWS>,
+        sides: usize,
+        about: &About,
+    ) -> Self {
+        Self {
+            degree: block.degree(),
             sides,
             empty: block.factor(),
-            block,
+            block: Box::new(block),
             own: about.text(),
             groups: Vec::new(),
             places: Vec::new(),
             waiting: Vec::new(),
-        })
+        }
     }
 
     /// Returns fits with the same settings and without any group.

@@ -168,8 +168,7 @@ mod tests {
     /// A day whose rows share a constant error and a slow error, so that a test that assumes white
     /// noise would be wrong.
     fn day(dice: &mut RandomGenerator, gain: f64) -> Day {
-        let degree = Degree::POLY13;
-        let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64, TERMS>::new(degree).unwrap());
+        let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64, TERMS>::of::<1, 3>());
         let (shared, mut slow) = (0.004 * dice.gauss(), 0.0);
         let begin = 6.0 * dice.unit();
         for n in 0..200 {

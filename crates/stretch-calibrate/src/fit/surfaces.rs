@@ -279,7 +279,7 @@ fn factors(samples: &[Folded], degree: Degree) -> Result<Factors, FitError> {
     let mut sorted: Vec<&Folded> = samples.iter().collect();
     sorted.sort_by_key(|(fold, _)| *fold);
     let factor = |fold: &[&Folded]| {
-        let mut sums = SurfaceAccumulator::<f64>::new(degree)?;
+        let mut sums = SurfaceAccumulator::<f64>::new(degree);
         sums.extend(fold.iter().map(|(_, sample)| *sample))?;
         Ok(sums.factor())
     };

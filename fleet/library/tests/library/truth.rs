@@ -11,7 +11,7 @@ use crate::support::{Row, add_states, ask, assert_close, fit, gauge, session};
 
 /// Fits both branches of a degree in one pass. The branch with rates of at least zero comes first.
 fn direct(rows: &[Row], degree: Degree) -> (Vec<f64>, f64) {
-    let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64>::new(degree).unwrap());
+    let mut sides = [(); 2].map(|()| SurfaceAccumulator::<f64>::new(degree));
     for (_, rate, signal, reference) in rows {
         let (&Some(rate), &Some(volts), &Some(value)) = (rate, signal, reference) else { continue };
         sides[usize::from(rate < 0.0)].push(Sample { rate, volts, value }).unwrap();
@@ -39,7 +39,7 @@ fn poly13_is_the_fit_of_one_pass() {
 #[test]
 fn a_line_is_the_fit_of_one_pass() {
     let rows = gauge(3000, 9);
-    let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE).unwrap();
+    let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE);
     for (_, _, signal, reference) in &rows {
         let (volts, value) = (signal.unwrap(), reference.unwrap());
         line.push(Sample { rate: 0.0, volts, value }).unwrap();

@@ -15,7 +15,7 @@ use stretch_core::{
 };
 use stretch_filter::SgRate;
 use stretch_fit::{Sample, SurfaceAccumulator};
-use stretch_metrics::{Agreement, Delta};
+use stretch_metrics::{Agreement, Delta, Pair};
 use stretch_receptor::StretchReceptor;
 
 const REST_LENGTH_MM: f64 = 180.0;
@@ -139,7 +139,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let (length_mm, bridge_v) = record(SEED + 1, 60.0);
     for (&truth, &volts) in length_mm.iter().zip(&bridge_v) {
         if let Ok(reading) = receptor.step(&mut memory, Volts(volts as f32)) {
-            agreement.push(truth, f64::from(reading.length().0));
+            agreement.push(Pair { truth, estimate: f64::from(reading.length().0) });
         }
     }
     let rmse_mm = agreement.errors().rmse().ok_or("no sample was estimated")?;

@@ -3,7 +3,7 @@
 use stretch_core::{Interval, Real};
 
 use crate::{
-    ErrorStats,
+    ErrorStats, Pair,
     sum::{Moments, Sum, largest, real},
 };
 
@@ -30,10 +30,10 @@ pub enum Delta {
 /// ```
 ///
 /// ```
-/// use stretch_metrics::{Agreement, Delta};
+/// use stretch_metrics::{Agreement, Delta, Pair};
 /// let mut agreement = Agreement::<f64>::new();
 /// for (truth, estimate) in [(150.0, 152.0), (160.0, 160.0), (170.0, 172.0), (180.0, 176.0)] {
-///     agreement.push(truth, estimate);
+///     agreement.push(Pair { truth, estimate });
 /// }
 /// assert_eq!(agreement.truth_range().unwrap().max, 180.0);
 /// assert_eq!(agreement.average_error_percent(Delta::Estimate), Some(100.0 * 2.0 / 24.0));
@@ -131,10 +131,10 @@ impl<T: Real> Agreement<T> {
     /// Adds a pair and returns whether it was accepted. A pair that is not finite, or too large to
     /// be squared (see [`ErrorStats`]), is refused.
     #[inline]
-    pub fn push(&mut self, truth: T, estimate: T) -> bool {
+    pub fn push(&mut self, Pair { truth, estimate }: Pair<T>) -> bool {
         let limit = largest::<T>();
         let sound = truth.abs() <= limit && estimate.abs() <= limit;
-        let taken = sound && self.errors.push(truth, estimate);
+        let taken = sound && self.errors.push(Pair { truth, estimate });
         if taken {
             let (before, _) = self.truth.push(truth);
             let (_, after) = self.estimate.push(estimate);
@@ -176,9 +176,9 @@ impl<T: Real> Agreement<T> {
     /// `None` if one of them is not finite.
     ///
     /// ```
-    /// use stretch_metrics::Agreement;
+    /// use stretch_metrics::{Agreement, Pair};
     /// let mut agreement = Agreement::<f64>::new();
-    /// agreement.push(150.0, 152.0);
+    /// agreement.push(Pair { truth: 150.0, estimate: 152.0 });
     /// assert_eq!(Agreement::from_spec(agreement.spec()), Some(agreement));
     /// ```
     pub fn from_spec(spec: AgreementSpec<T>) -> Option<Self> {

@@ -64,7 +64,7 @@ impl<T: Real> BlockMeans<T> {
 /// use stretch_metrics::PairedBlocks;
 /// let mut test = PairedBlocks::<f64>::new(2)?;
 /// for (first, second) in [(1.0, 0.0), (3.0, 1.0), (2.0, 1.5), (2.0, 0.5), (9.0, 9.0)] {
-///     test.push(first, second);
+///     test.push(first - second);
 /// }
 /// assert_eq!(test.test()?.count, 2, "the fifth pair is no block");
 /// assert_eq!(test.test()?.mean_difference, 1.25);
@@ -86,17 +86,16 @@ impl<T: Real> PairedBlocks<T> {
         Ok(Self { blocks: BlockMeans::new(length)?, test: PairedT::new(), skipped: 0 })
     }
 
-    /// Adds a pair and returns whether it was accepted. A pair that [`PairedT`] would refuse also
-    /// discards the incomplete block.
+    /// Adds the difference of a pair and returns whether it was accepted. A difference that [`PairedT`]
+    /// would refuse also discards the incomplete block.
     #[inline]
-    pub fn push(&mut self, first: T, second: T) -> bool {
-        let difference = first - second;
+    pub fn push(&mut self, difference: T) -> bool {
         let taken = difference.abs() <= crate::sum::largest();
         if !taken {
             self.skipped += 1;
             self.blocks.end_recording();
         } else if let Some(mean) = self.blocks.push(difference) {
-            self.test.push(mean, T::zero());
+            self.test.push(mean);
         }
         taken
     }

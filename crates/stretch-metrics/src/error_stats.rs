@@ -4,6 +4,23 @@ use stretch_core::Real;
 
 use crate::sum::{Moments, Sum, largest, real};
 
+/// A true value and its estimate, in one unit.
+///
+/// ```
+/// use stretch_metrics::{ErrorStats, Pair};
+/// let mut stats = ErrorStats::new();
+/// assert!(stats.push(Pair { truth: 20.0, estimate: 17.0 }));
+/// assert_eq!(stats.bias(), Some(-3.0), "the estimate is too small");
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct Pair<T> {
+    /// The true value.
+    pub truth: T,
+    /// The estimate of it.
+    pub estimate: T,
+}
+
 /// Error statistics of an estimate against the truth: count, bias, MAE, RMSE, standard deviation,
 /// largest error.
 ///
@@ -16,10 +33,10 @@ use crate::sum::{Moments, Sum, largest, real};
 /// about 1e15 in `f32`, 1e150 in `f64`), is refused and counted in [`skipped`](Self::skipped).
 ///
 /// ```
-/// use stretch_metrics::ErrorStats;
+/// use stretch_metrics::{ErrorStats, Pair};
 /// let mut stats = ErrorStats::<f64>::new();
 /// for (truth, estimate) in [(10.0, 11.0), (20.0, 17.0)] {
-///     stats.push(truth, estimate);
+///     stats.push(Pair { truth, estimate });
 /// }
 /// assert_eq!(stats.bias(), Some(-1.0));
 /// assert_eq!(stats.mae(), Some(2.0));
@@ -49,7 +66,7 @@ impl<T: Real> ErrorStats<T> {
 
     /// Adds a pair and returns whether it was accepted.
     #[inline]
-    pub fn push(&mut self, truth: T, estimate: T) -> bool {
+    pub fn push(&mut self, Pair { truth, estimate }: Pair<T>) -> bool {
         let error = estimate - truth;
         let size = error.abs();
         // Also false for NaN.

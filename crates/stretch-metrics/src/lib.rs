@@ -18,6 +18,6 @@ mod sum;
 pub use agreement::{Agreement, AgreementSpec, Delta};
 pub use blocks::{BlockMeans, PairedBlocks};
 pub use error::MetricsError;
-pub use error_stats::ErrorStats;
+pub use error_stats::{ErrorStats, Pair};
 pub use lag::{Lag, lag};
 pub use paired::{PairedT, TTest};

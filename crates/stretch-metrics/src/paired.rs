@@ -8,10 +8,9 @@ use crate::{
     sum::{Moments, largest},
 };
 
-/// Accumulates paired samples for Student's paired t test.
+/// Accumulates the differences of paired samples for Student's paired t test.
 ///
-/// The difference is d = first - second, and t = mean(d) / (s_d / sqrt(n)) with n - 1 degrees of
-/// freedom. The test assumes independent pairs. Neighbouring samples of a recording are correlated,
+/// With the differences d, t = mean(d) / (s_d / sqrt(n)) with n - 1 degrees of freedom. The test assumes independent pairs. Neighbouring samples of a recording are correlated,
 /// so P is far too small. [`PairedBlocks`](crate::PairedBlocks) tests means over blocks, whose P is
 /// more realistic. Report both.
 ///
@@ -19,7 +18,7 @@ use crate::{
 /// use stretch_metrics::PairedT;
 /// let mut test = PairedT::<f64>::new();
 /// for (linear, surface) in [(1.9, 1.5), (1.7, 1.6), (2.1, 1.4), (1.8, 1.6)] {
-///     test.push(linear, surface);
+///     test.push(linear - surface);
 /// }
 /// let result = test.test()?;
 /// assert_eq!(result.dof, 3);
@@ -40,7 +39,7 @@ pub struct PairedT<T> {
 pub struct TTest {
     /// Number of pairs or blocks.
     pub count: u64,
-    /// Mean of first - second, in their unit.
+    /// Mean of the differences, in their unit.
     pub mean_difference: f64,
     /// Standard error of that mean.
     pub standard_error: f64,
@@ -76,11 +75,10 @@ impl<T: Real> PairedT<T> {
         Self { moments: Moments::new(), skipped: 0 }
     }
 
-    /// Adds a pair and returns whether it was accepted. A pair that is not finite, or whose
-    /// difference is too large to be squared (see [`ErrorStats`](crate::ErrorStats)), is refused.
+    /// Adds the difference of a pair and returns whether it was accepted. A difference that is not finite,
+    /// or too large to be squared (see [`ErrorStats`](crate::ErrorStats)), is refused.
     #[inline]
-    pub fn push(&mut self, first: T, second: T) -> bool {
-        let difference = first - second;
+    pub fn push(&mut self, difference: T) -> bool {
         let taken = difference.abs() <= largest();
         if taken {
             self.moments.push(difference);

@@ -2,11 +2,11 @@
 //!
 //! ```
 //! use proptest::prelude::*;
-//! use stretch_metrics::{ErrorStats, strategies};
+//! use stretch_metrics::{ErrorStats, Pair, strategies};
 //! proptest!(|(pairs in strategies::pairs(1..50))| {
 //!     let mut stats = ErrorStats::new();
-//!     for (truth, estimate) in &pairs {
-//!         stats.push(*truth, *estimate);
+//!     for &(truth, estimate) in &pairs {
+//!         stats.push(Pair { truth, estimate });
 //!     }
 //!     prop_assert_eq!(stats.count(), pairs.len() as u64);
 //! });

@@ -1,7 +1,7 @@
 //! Tests of long streams, short streams, and inputs for which a metric is undefined.
 
 use approx::relative_eq;
-use stretch_metrics::{Agreement, Delta, ErrorStats, MetricsError, PairedBlocks, PairedT, lag};
+use stretch_metrics::{Agreement, Delta, ErrorStats, MetricsError, Pair, PairedBlocks, PairedT, lag};
 use testkit::tolerance;
 
 #[test]
@@ -9,8 +9,8 @@ fn long_streams_of_f32_keep_their_digits() {
     let (mut short, mut long) = (ErrorStats::<f32>::new(), ErrorStats::<f64>::new());
     for i in 0..3_000_000_u32 {
         let estimate = 180.0 + (i.wrapping_mul(2_654_435_761) >> 8) as f32 * 1e-6;
-        short.push(179.5, estimate);
-        long.push(179.5, f64::from(estimate));
+        short.push(Pair { truth: 179.5, estimate });
+        long.push(Pair { truth: 179.5, estimate: f64::from(estimate) });
     }
     for (short, long) in [
         (short.bias(), long.bias()),
@@ -30,12 +30,12 @@ fn long_streams_of_f32_keep_their_digits() {
 fn what_cannot_be_said_is_not() {
     assert_eq!(ErrorStats::<f64>::new().bias(), None);
     let mut one = Agreement::new();
-    one.push(1.0, 2.0);
+    one.push(Pair { truth: 1.0, estimate: 2.0 });
     assert_eq!(one.average_error_percent(Delta::Truth), None, "no range");
     assert_eq!((one.r_squared(), one.errors().std_dev()), (None, None));
     let mut test = PairedT::new();
     assert_eq!(test.test(), Err(MetricsError::TooFew { needed: 2, got: 0 }));
-    (0..3).for_each(|_| assert!(test.push(1.0, 0.5)));
+    (0..3).for_each(|_| assert!(test.push(0.5)));
     assert_eq!(test.test(), Err(MetricsError::Constant { signal: "difference" }));
     assert_eq!(PairedBlocks::<f32>::new(0).err(), Some(MetricsError::EmptyBlock));
     let ramp: Vec<f64> = (0..9).map(f64::from).collect();

@@ -4,14 +4,14 @@ use approx::{assert_abs_diff_eq, relative_eq};
 use proptest::prelude::*;
 use stretch_core::Interval;
 use stretch_metrics::{
-    Agreement, Delta, PairedBlocks, PairedT, lag, strategies, student_t::ln_two_tailed,
+    Agreement, Delta, Pair, PairedBlocks, PairedT, lag, strategies, student_t::ln_two_tailed,
 };
 use testkit::tolerance;
 
 fn agreement(pairs: &[(f64, f64)]) -> Agreement<f64> {
     let mut all = Agreement::new();
-    for &(t, e) in pairs {
-        all.push(t, e);
+    for &(truth, estimate) in pairs {
+        all.push(Pair { truth, estimate });
     }
     all
 }
@@ -106,7 +106,7 @@ proptest! {
         }
         let (mut test, mut blocks) = (PairedT::new(), PairedBlocks::new(3)?);
         for &(a, b) in &pairs {
-            prop_assert_eq!(test.push(a, b), blocks.push(a, b));
+            prop_assert_eq!(test.push(a - b), blocks.push(a - b));
         }
         for result in [test.test(), blocks.test()].into_iter().flatten() {
             prop_assert!(result.t.is_finite() && result.ln_p <= 0.0, "{result:?}");
@@ -130,8 +130,8 @@ proptest! {
     fn swapping_the_pairs_turns_the_test_round(pairs in strategies::pairs(3..80)) {
         let (mut one, mut other) = (PairedT::new(), PairedT::new());
         for &(a, b) in &pairs {
-            one.push(a, b);
-            other.push(b, a);
+            one.push(a - b);
+            other.push(b - a);
         }
         let (one, other) = (one.test()?, other.test()?);
         prop_assert_eq!((one.t, one.p, one.dof), (-other.t, other.p, other.dof));

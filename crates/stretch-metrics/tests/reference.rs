@@ -2,7 +2,7 @@
 
 use approx::relative_eq;
 use stretch_metrics::{
-    Agreement, Delta, PairedBlocks, PairedT, TTest, fisher_f, lag,
+    Agreement, Delta, Pair, PairedBlocks, PairedT, TTest, fisher_f, lag,
     student_t::{critical, ln_two_tailed, two_tailed},
 };
 use testkit::{tolerance, vectors::columns};
@@ -22,7 +22,7 @@ fn errors_agreement_and_lag() {
         let estimate = &signals[name];
         let mut agreement = Agreement::new();
         for (&t, &e) in truth.iter().zip(estimate) {
-            assert!(agreement.push(t, e));
+            assert!(agreement.push(Pair { truth: t, estimate: e }));
         }
         let errors = agreement.errors();
         let lag = lag(truth, estimate, 20).expect("enough samples");
@@ -54,8 +54,8 @@ fn paired_tests_on_samples_and_blocks() {
     let (mut samples, mut blocks) = (PairedT::new(), PairedBlocks::new(50).expect("not empty"));
     for ((t, a), b) in signals["truth"].iter().zip(&signals["first"]).zip(&signals["second"]) {
         let (a, b) = ((a - t).abs(), (b - t).abs());
-        samples.push(a, b);
-        blocks.push(a, b);
+        samples.push(a - b);
+        blocks.push(a - b);
     }
     let tests: [TTest; 2] = [samples.test().expect("spread"), blocks.test().expect("spread")];
     for (row, test) in tests.iter().enumerate() {

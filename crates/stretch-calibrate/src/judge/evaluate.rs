@@ -3,7 +3,7 @@
 use serde::Serialize;
 use stretch_core::{Calibration, Polarity};
 use stretch_data::{Trial, check_rows, in_digits, resampling, unit_of};
-use stretch_metrics::{Agreement, Delta, PairedBlocks, PairedT, TTest, lag};
+use stretch_metrics::{Agreement, Delta, Pair, PairedBlocks, PairedT, TTest, lag};
 
 use crate::{
     CalibrateError,
@@ -325,7 +325,7 @@ impl Tally {
             if estimate.is_nan() {
                 tally.withheld += 1;
             } else {
-                tally.agreement.push(truth, estimate);
+                tally.agreement.push(Pair { truth, estimate });
             }
         }
         // The warm-up is at the start. The lag is computed from the first estimate on.
@@ -395,8 +395,8 @@ impl Tests {
                 let first = (truth - methods[a].values[i]).abs();
                 let second = (truth - methods[b].values[i]).abs();
                 if first.is_finite() && second.is_finite() {
-                    self.samples[test].push(first, second);
-                    self.blocks[test].push(first, second);
+                    self.samples[test].push(first - second);
+                    self.blocks[test].push(first - second);
                 }
             }
             self.blocks[test].end_recording();

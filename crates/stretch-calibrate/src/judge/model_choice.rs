@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 use stretch_core::Degree;
 use stretch_data::{Trial, unit_of};
-use stretch_metrics::Agreement;
+use stretch_metrics::{Agreement, Pair};
 
 use crate::{
     CalibrateError, Memory, ModelKind, Options,
@@ -413,8 +413,8 @@ pub fn copied_signals(trials: &[Trial], names: &[String]) -> Vec<String> {
     for (i, (first, a)) in signals.iter().enumerate() {
         for (second, b) in &signals[i + 1..] {
             let mut both = Agreement::<f64>::new();
-            for (x, y) in a.iter().zip(*b).take(COMPARED) {
-                both.push(*x, *y);
+            for (&truth, &estimate) in a.iter().zip(*b).take(COMPARED) {
+                both.push(Pair { truth, estimate });
             }
             if both.correlation().is_some_and(|r| r.abs() > COPY) {
                 notes.push(format!(

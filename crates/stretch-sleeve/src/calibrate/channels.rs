@@ -7,7 +7,7 @@ use stretch_calibrate::{
 };
 use stretch_core::SampleRate;
 use stretch_data::{Trial, check_rows};
-use stretch_metrics::Agreement;
+use stretch_metrics::{Agreement, Pair};
 
 use crate::{MAX_CHANNELS, SleeveError};
 
@@ -180,8 +180,8 @@ fn without_an_open_end(
 /// Returns Pearson's correlation of two equally long sequences; zero if one of them is constant.
 pub(crate) fn correlation(a: impl Iterator<Item = f64>, b: impl Iterator<Item = f64>) -> f64 {
     let mut agreement = Agreement::new();
-    for (x, y) in a.zip(b) {
-        agreement.push(x, y);
+    for (truth, estimate) in a.zip(b) {
+        agreement.push(Pair { truth, estimate });
     }
     agreement.correlation().unwrap_or(0.0)
 }

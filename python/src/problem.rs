@@ -136,7 +136,7 @@ impl Entries {
     /// Names of all effects that are looked for.
     #[getter]
     fn catalogue(&self) -> Vec<String> {
-        self.checked.description().effects.iter().map(|e| e.name.clone()).collect()
+        self.checked.description().spec().effects.iter().map(|e| e.name.clone()).collect()
     }
 
     /// Columns on the grid, all trials end to end.
@@ -352,7 +352,7 @@ fn answer(problem: &Problem, examined: Examined) -> Answer {
     let curve = |(stage, e): (usize, &stretch_gap::StageEvidence)| {
         let measured = simulator.measured(stage).to_vec();
         let curves = [measured, e.raw.clone(), e.retuned.clone(), e.after.clone()];
-        (simulator.description().stages[stage].channel.clone(), curves)
+        (simulator.description().spec().stages[stage].channel.clone(), curves)
     };
     let curves = examined.evidence.stages.iter().enumerate().map(curve).collect();
     let implementations = examined.implementations.iter();

@@ -27,7 +27,7 @@ impl Simulator for Motor {
             load = shaft - (shaft - load).clamp(-play, play);
             *out = if run.stage == 0 { speed } else { load };
             let push = p[0] * self.volts[i] + ripple * (6.0 * self.angle[i]).sin();
-            for _ in 0..(self.description.dt_s / h).round() as usize {
+            for _ in 0..(self.description.spec().dt_s / h).round() as usize {
                 let drag = if speed == 0.0 { push } else { f64::INFINITY.copysign(speed) };
                 let end = (push - drag.clamp(-friction, friction)) / p[1];
                 let next = end + (speed - end) * (-p[1] * h).exp();

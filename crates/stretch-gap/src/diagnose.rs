@@ -333,7 +333,7 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
     let all = hypotheses(&found.best, &found.rivals, eliminated, &problem.nominal);
     let (all, held) = candidates(problem, &evidence, all, seed)?;
     let about = problem.simulator().description();
-    let too_little = too_little(&evidence.roles, about.rows_used(), about.dt_s);
+    let too_little = too_little(&evidence.roles, about.rows_used(), about.spec().dt_s);
     let mut proposal = None;
     let lacks = |evidence: &Evidence, best: &Hypothesis| {
         if too_little.is_some() {

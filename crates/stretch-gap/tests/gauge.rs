@@ -92,7 +92,7 @@ impl Gauge {
     /// The same gauge, whose stated noise is `times` the true noise.
     pub(crate) fn with_noise_taken_for(&self, times: f64) -> Self {
         let mut other = self.clone();
-        let mut spec = (*self.description).clone();
+        let mut spec = self.description.spec().clone();
         spec.stages[0].noise = Some(stretch_gap::Noise::known(times * NOISE_V));
         let known = self.description.record().clone();
         let description = Description::new(spec).and_then(|d| d.with_record(known));
@@ -104,7 +104,7 @@ impl Gauge {
     pub(crate) fn scaled(&self, rod: f64, output: f64) -> Self {
         let rod_mm: Vec<f64> = self.rod_mm.iter().map(|x| rod * x).collect();
         Self {
-            description: description(self.description.trials.clone(), output, &rod_mm),
+            description: description(self.description.spec().trials.clone(), output, &rod_mm),
             units: [rod, output],
             rod_mm,
             volts: self.volts.iter().map(|x| output * x).collect(),

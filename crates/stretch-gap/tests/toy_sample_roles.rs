@@ -45,7 +45,7 @@ proptest! {
         let last = trials.iter().rposition(|(_, is_test)| !is_test).expect("one to fit");
         prop_assert_eq!(roles.fit_trials, last + 1);
         let specs = record.toy.description();
-        let not_tested = SampleRoles::not_tested(&specs.trials);
+        let not_tested = SampleRoles::not_tested(&specs.spec().trials);
         for (trial, range) in record.toy.ranges().into_iter().enumerate() {
             let own: Vec<_> = roles.segments.iter().filter(|s| s.trial == trial).collect();
             prop_assert!(own.iter().all(|s| range.contains(&s.from) && s.to <= range.end));

@@ -208,7 +208,7 @@ pub fn predict_with(
         return Err(ProblemError::too_little("no new recording is long enough", hint));
     }
     let mut notes: Vec<String> = with.notes().iter().cloned().chain(source.notes()).collect();
-    let has_free = with.description().parameters.iter().any(|p| p.sd > 0.0);
+    let has_free = with.description().spec().parameters.iter().any(|p| p.sd > 0.0);
     if has_free && !is_tuned && !effects.is_empty() {
         notes.push("the fix has no parameter values that were re-tuned without the effects (alone), so its values are used; this makes the simulator without the fix look worse than it is".into());
     }
@@ -255,7 +255,8 @@ fn score(
     samples: &Range<usize>,
     outputs: &[Vec<Vec<f64>>; 2],
 ) -> PredictedOutput {
-    let (spec, noise) = (&problem.description().stages[stage], problem.recorded[stage].noise.sd());
+    let (spec, noise) =
+        (&problem.description().spec().stages[stage], problem.recorded[stage].noise.sd());
     let measured = problem.columns.all(&spec.channel).get(samples.clone()).unwrap_or(&[]);
     let [with, without] = outputs.each_ref().map(|all| all[stage][samples.clone()].to_vec());
     let [rmse, rmse_without] = [&with, &without].map(|predicted| {

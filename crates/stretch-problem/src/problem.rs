@@ -46,7 +46,7 @@ pub trait Diagnosable: Laboratory + Debug + Send {
     /// Code for the effects that a diagnosis names, for the user to copy into the simulator.
     fn implementations(&self, diagnosis: &Diagnosis, evidence: &Evidence) -> Vec<Implementation> {
         let Ok(chosen) = Chosen::of(diagnosis, evidence) else { return Vec::new() };
-        let effects = &self.description().effects;
+        let effects = &self.description().spec().effects;
         let one = |(effect, values): (usize, &[f64])| {
             let EffectSpec { name, stage, .. } = &effects[effect];
             let [words, formula] = self.in_words(effect).map(str::to_owned);

@@ -96,7 +96,7 @@ fn examined(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (Problem, Examine
         Ok(u.chunks(SAMPLES).flat_map(|u| servo([gain * gear, tau, ask.effects[0]], u)).collect())
     });
     let bench = BlackBox::new(problem, Arc::new(plant));
-    assert_eq!(bench.description().trials.len(), servos.len());
+    assert_eq!(bench.description().spec().trials.len(), servos.len());
     let problem = Problem::from(bench);
     let examined =
         problem.examine(&Options::default(), false, &|_| (), &|| false).expect("a diagnosis");

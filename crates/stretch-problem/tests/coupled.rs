@@ -164,7 +164,7 @@ fn what_the_knee_carries_of_the_hips_dead_zone_is_no_effect_of_its_own() {
     assert!(found.candidates[0].closed > 0.99, "{}", found.sentence);
     assert!((value(&found, "hip.input.dead_zone") - DEAD.hip).abs() < 0.01, "{}", found.sentence);
     let touches = |bench: &BlackBox, name: &str| {
-        let effects = &bench.description().effects;
+        let effects = &bench.description().spec().effects;
         effects.iter().find(|e| e.name == name).map(|e| e.touches.clone())
     };
     assert_eq!(touches(&bench, "hip.input.dead_zone"), Some(vec![0, 1]));
@@ -204,7 +204,7 @@ fn a_wrapper_that_acts_in_every_run_acts_on_both_joints() {
 fn an_experiment_drives_both_joints_at_once() {
     let problem = Checked::new(problem(CARRIED, DEAD, &NAMES)).expect("a problem");
     let bench = BlackBox::new(problem, Arc::new(Leg { carried: CARRIED, takes_several: true }));
-    let effects = &bench.description().effects;
+    let effects = &bench.description().spec().effects;
     let dead_zone = effects.iter().position(|e| e.name == "hip.input.dead_zone").expect("a zone");
     let mut values = effects[dead_zone].starts[0].clone();
     values[0] = DEAD.hip;
@@ -227,7 +227,7 @@ fn joints_that_do_not_hang_together_are_diagnosed_as_ever() {
     let (several, bench) = diagnosed(problem(0.0, DEAD, &NAMES[..1]), 0.0, true);
     let (single, other) = diagnosed(problem(0.0, DEAD, &NAMES[..1]), 0.0, false);
     assert_eq!(several.named, ["hip.input.dead_zone"], "{}", several.sentence);
-    assert!(bench.description().effects.iter().all(|e| e.touches.len() == 1));
+    assert!(bench.description().spec().effects.iter().all(|e| e.touches.len() == 1));
     assert_eq!(bench.model_runs(), other.model_runs());
     let alike = |found| Diagnosis { runtime_s: 0.0, ..found };
     assert_eq!(alike(several), alike(single));

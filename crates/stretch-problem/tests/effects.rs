@@ -99,14 +99,14 @@ fn unseen(simulator: &dyn Laboratory) -> Vec<String> {
             all.any(|(x, before)| simulator.predict(model, &x.trial).unwrap() != *before)
         })
     };
-    let names = simulator.description().effects.iter().enumerate();
+    let names = simulator.description().spec().effects.iter().enumerate();
     names.filter(|(i, _)| !is_seen(*i)).map(|(_, e)| e.name.clone()).collect()
 }
 
 #[test]
 fn every_effect_changes_an_experiment() {
     let rig = simulator(&Rig::default(), 1, &Catalogue::default());
-    assert_eq!(rig.description().effects.len(), CATALOGUE.len());
+    assert_eq!(rig.description().spec().effects.len(), CATALOGUE.len());
     assert_eq!(unseen(&rig), [""; 0]);
     assert_eq!(unseen(&gauge()), [""; 0]);
 }
@@ -115,7 +115,7 @@ fn every_effect_changes_an_experiment() {
 #[ignore = "every effect in every experiment; ./ci.sh runs it"]
 fn every_effect_can_be_told_by_an_experiment() {
     let rig = simulator(&Rig::default(), 1, &Catalogue::default());
-    for (i, effect) in rig.description().effects.iter().enumerate() {
+    for (i, effect) in rig.description().spec().effects.iter().enumerate() {
         let model = models(&rig, i).pop().unwrap();
         let d = differences(&rig, &model, &Model::nominal(&rig)).unwrap();
         assert!(d.iter().all(|x| x.1.is_finite()), "{}: {d:?}", effect.name);
@@ -126,7 +126,7 @@ fn every_effect_can_be_told_by_an_experiment() {
 #[test]
 fn what_a_diagnosis_answers_is_what_a_simulation_takes() {
     let rig = simulator(&Rig::default(), 1, &Catalogue::default());
-    for effect in &rig.description().effects {
+    for effect in &rig.description().spec().effects {
         for start in &effect.starts {
             let names = effect.parameters.iter().map(|p| &*p.name);
             let given: Vec<(&str, f64)> = names.zip(start.iter().copied()).collect();
@@ -145,7 +145,7 @@ fn what_a_diagnosis_answers_is_what_a_simulation_takes() {
         gain: Tolerance::Exact,
         effects: EffectSet::new(),
     };
-    for effect in &gauge().description().effects {
+    for effect in &gauge().description().spec().effects {
         for start in &effect.starts {
             let names = effect.parameters.iter().map(|p| p.name.to_string());
             let parameters = names.zip(start.iter().copied()).collect();
@@ -162,7 +162,7 @@ fn an_effect_of_ones_own_is_simulated_listed_and_named() {
     rig.effects.push(&CHARGER, &[0.02]).unwrap();
     let catalogue = Catalogue::default().with(&CHARGER).unwrap();
     let simulator = simulator(&rig, 3, &catalogue);
-    assert_eq!(simulator.description().effects.last().unwrap().name, "charger_ripple");
+    assert_eq!(simulator.description().spec().effects.last().unwrap().name, "charger_ripple");
     let options = Options { depth: std::num::NonZeroUsize::new(1).unwrap(), ..Options::default() };
     let (diagnosis, _) = diagnose(&simulator, &options, &|_| (), &|| false).unwrap();
     assert_eq!(diagnosis.verdict, VerdictKind::Effect, "{}", diagnosis.sentence);
@@ -222,7 +222,8 @@ fn a_kind_of_ones_own_is_wrapped_named_and_printed() {
     let spring = closure(move |ask: &Ask<'_>| {
         Ok(force[..session.samples(ask.trials)].iter().map(|f| ask.parameters[0] * f).collect())
     });
-    let listed: Vec<&str> = problem.description().effects.iter().map(|e| e.name.as_str()).collect();
+    let listed: Vec<&str> =
+        problem.description().spec().effects.iter().map(|e| e.name.as_str()).collect();
     let at = listed.iter().position(|name| *name == "output.ripple").unwrap();
     let black_box = BlackBox::new(problem, Arc::new(spring));
     let (diagnosis, _) = diagnose(&black_box, &Options::default(), &|_| (), &|| false).unwrap();

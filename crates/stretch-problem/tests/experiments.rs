@@ -24,10 +24,13 @@ fn rig() -> RigSimulator {
 /// Distance D between the predictions for two effects at given first parameters, for every candidate experiment.
 fn of(rig: &RigSimulator, one: (&str, f64), two: (&str, f64)) -> Vec<(String, f64)> {
     let model = |(name, value): (&str, f64)| {
-        let at = rig.description().effects.iter().position(|e| e.name == name).unwrap();
-        let mut values = rig.description().effects[at].starts[0].clone();
-        let which =
-            rig.description().effects[at].parameters.iter().position(|p| p.name != "v_lo").unwrap();
+        let at = rig.description().spec().effects.iter().position(|e| e.name == name).unwrap();
+        let mut values = rig.description().spec().effects[at].starts[0].clone();
+        let which = rig.description().spec().effects[at]
+            .parameters
+            .iter()
+            .position(|p| p.name != "v_lo")
+            .unwrap();
         values[which] = value;
         let mut model = Model::nominal(rig);
         model.effects.push((at, values));

@@ -257,7 +257,7 @@ fn effects_are_left_out_by_name_by_kind_and_by_place() {
             described(trials.clone(), &["output.backlash", "input.delay", "output.curve"]);
         spec.without = without.iter().map(|w| (*w).to_owned()).collect();
         let checked = Checked::new(spec).map_err(|e| e.to_string())?;
-        let effects = &checked.description().effects;
+        let effects = &checked.description().spec().effects;
         Ok::<_, String>(effects.iter().map(|e| e.name.clone()).collect::<Vec<_>>())
     };
     assert_eq!(names(&["bend", "curve"]).unwrap(), ["input.delay", "output.backlash"]);

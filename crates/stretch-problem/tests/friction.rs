@@ -68,7 +68,7 @@ fn spec([input, output]: [&str; 2]) -> ProblemSpec {
 }
 
 fn frictions(problem: &Checked) -> Vec<String> {
-    let names = problem.description().effects.iter().map(|effect| effect.name.clone());
+    let names = problem.description().spec().effects.iter().map(|effect| effect.name.clone());
     names.filter(|name| name.ends_with("_friction")).collect()
 }
 

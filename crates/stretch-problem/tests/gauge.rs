@@ -373,9 +373,9 @@ fn uneven_and_broken_records_are_mended_and_told() {
         channel.values = kept.iter().map(|&i| channel.values[i]).collect();
     }
     let gauge = GaugeSimulator::new(&setup(&trials, &Catalogue::default())).expect("a gauge");
-    let parts: Vec<usize> = gauge.description().trials.iter().map(|t| t.samples).collect();
+    let parts: Vec<usize> = gauge.description().spec().trials.iter().map(|t| t.samples).collect();
     assert!(parts.len() == 2 && parts.iter().sum::<usize>().abs_diff(5800) < 20, "{parts:?}");
-    assert_abs_diff_eq!(gauge.description().trials[1].start_s, 32.0, epsilon = RESUMED_S);
+    assert_abs_diff_eq!(gauge.description().spec().trials[1].start_s, 32.0, epsilon = RESUMED_S);
     assert!(gauge.notes().iter().any(|n| n.contains("missing after 29.9")), "{:?}", gauge.notes());
     assert!(gauge.notes().iter().any(|n| n.contains("unevenly")), "{:?}", gauge.notes());
     let d = diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
@@ -412,7 +412,7 @@ fn a_gauge_that_has_the_effect_agrees_and_one_without_tolerance_stays_put() {
         ..setup(&trials, &Catalogue::default())
     });
     let gauge = gauge.expect("a gauge");
-    assert!(gauge.description().effects.iter().all(|e| e.name != "channel_skew"));
+    assert!(gauge.description().spec().effects.iter().all(|e| e.name != "channel_skew"));
     let d = diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
     let agrees = matches!(d.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
     assert!(agrees && d.named.is_empty(), "{}", d.sentence);

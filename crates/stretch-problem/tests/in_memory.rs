@@ -134,7 +134,7 @@ type Shortening =
     (&'static str, usize, Box<dyn Fn(&[SessionTrial]) -> Result<Shortened, ProblemError>>);
 
 fn shortening() -> Vec<Shortening> {
-    let samples = |about: &Description| about.trials.iter().map(|t| t.samples).collect();
+    let samples = |about: &Description| about.spec().trials.iter().map(|t| t.samples).collect();
     let gauge = move |trials: &[SessionTrial]| {
         let catalogue = &Catalogue::default();
         let (reference, signal) = ("length_mm", "bridge_v");

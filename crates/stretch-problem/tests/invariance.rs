@@ -251,9 +251,9 @@ fn what_a_rate_cannot_show_is_not_looked_for() {
     let session = RigSession::new(&trials).expect("a session");
     let setup = RigSetup { session, rig: Rig::default(), catalogue: &catalogue };
     let rig = RigSimulator::new(setup).expect("a rig");
-    assert!(rig.description().effects.iter().all(|e| e.name != "mains_hum"));
+    assert!(rig.description().spec().effects.iter().all(|e| e.name != "mains_hum"));
     assert!(rig.notes().iter().any(|n| n.starts_with("mains_hum is not looked for")));
-    assert_eq!(rig.description().dt_s, 2.0 * DT_S);
+    assert_eq!(rig.description().spec().dt_s, 2.0 * DT_S);
 }
 
 /// Slack and a saturated amplifier bend the same end of the voltage, but only one of them moves

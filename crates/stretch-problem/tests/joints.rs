@@ -174,7 +174,7 @@ fn six_joints_with_sixty_parameters_are_diagnosed() {
         ..ProblemSpec::default()
     })
     .expect("a problem");
-    assert_eq!(problem.description().effects.len(), 10 * JOINTS);
+    assert_eq!(problem.description().spec().effects.len(), 10 * JOINTS);
     let column =
         |joint: usize| problem.session().column(&format!("u{joint}_V")).expect("a column").to_vec();
     let arm = Arm { commands: (0..JOINTS).map(column).collect() };

@@ -47,7 +47,7 @@ fn noise_that_is_not_told_is_that_of_the_rests() {
             ..ProblemSpec::default()
         });
         let problem = problem.expect("a problem");
-        let noise = problem.description().stages[0].noise.clone().expect("from the rests");
+        let noise = problem.description().spec().stages[0].noise.clone().expect("from the rests");
         assert!((noise.sd() / NOISE - 1.0).abs() < 0.2, "{damping}: {noise:?}");
         assert!(noise.source().starts_with("rests of the recording: "), "{noise:?}");
     }

@@ -112,7 +112,7 @@ fn turned_numbers_answer_as_the_simulator_does() {
         let mut model = evidence.best.clone();
         model.effects[0].1[turned] = answer.value;
         let mut out = vec![0.0; own.after.len()];
-        let run = Run::exact(stage, &model, simulator.description().trials.len());
+        let run = Run::exact(stage, &model, simulator.description().spec().trials.len());
         simulator.simulate(run, &mut out).expect("a run");
         let predicted = own.after.iter().zip(&answer.output).map(|(y, change)| y + change);
         assert!(
@@ -292,7 +292,7 @@ fn a_simulator_that_has_the_effect_agrees_and_is_not_offered_it_again() {
         let simulator =
             RigSimulator::new(RigSetup { session, rig, catalogue: &Catalogue::default() })
                 .expect("a simulator");
-        assert!(simulator.description().effects.iter().all(|e| e.name != name));
+        assert!(simulator.description().spec().effects.iter().all(|e| e.name != name));
         let d = diagnose(&simulator, &shallow(), &|_| (), &|| false).expect("a diagnosis").0;
         let agrees = matches!(d.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
         assert!(agrees && d.named.is_empty(), "{name}: {}", d.sentence);
@@ -308,12 +308,12 @@ fn a_parameter_without_tolerance_stays_put() {
     let simulator = RigSimulator::new(RigSetup { session, rig, catalogue: &Catalogue::default() })
         .expect("a simulator");
     let tuned: Vec<&str> =
-        simulator.description().parameters.iter().map(|p| p.name.as_str()).collect();
+        simulator.description().spec().parameters.iter().map(|p| p.name.as_str()).collect();
     // A parameter that the file omits keeps its stock tolerance. A parameter to which the file
     // gives a tolerance is free in its stage.
     assert!(!tuned.contains(&"tau_m") && tuned.contains(&"k_max"), "{tuned:?}");
     let at = tuned.iter().position(|name| *name == "L0").expect("L0 is free");
-    assert!(simulator.description().stages[1].parameters.contains(&at));
+    assert!(simulator.description().spec().stages[1].parameters.contains(&at));
     let d = diagnose(&simulator, &shallow(), &|_| (), &|| false).expect("a diagnosis").0;
     assert!(d.named.is_empty(), "{}", d.sentence);
 }

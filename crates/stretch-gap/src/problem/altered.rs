@@ -136,9 +136,9 @@ impl Simulator for Altered<'_> {
             None => self.simulator.simulate(run, out)?,
         }
         if column.is_some_and(|c| c.output_of == Some(run.stage)) {
-            for trial in TrialSpec::ranges(&self.about.trials[..run.trials]) {
+            for trial in TrialSpec::ranges(&self.about.spec().trials[..run.trials]) {
                 let distorted =
-                    one.distortion(size).distorted(&out[trial.clone()], self.about.dt_s);
+                    one.distortion(size).distorted(&out[trial.clone()], self.about.spec().dt_s);
                 out[trial].copy_from_slice(&distorted);
             }
         }

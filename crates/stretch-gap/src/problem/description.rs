@@ -1,6 +1,6 @@
 //! A simulator's description, checked once so that later indexing cannot fail.
 
-use std::{ops::Deref, sync::Arc};
+use std::sync::Arc;
 
 use serde::Serialize;
 use stretch_effects::EffectParameter;
@@ -27,7 +27,7 @@ pub struct DescriptionSpec {
     pub dt_s: f64,
 }
 
-/// A checked [`DescriptionSpec`]. It can be read like one, but not changed.
+/// A checked [`DescriptionSpec`]. [`spec`](Self::spec) reads it; it cannot be changed.
 ///
 /// Indices are in range, numbers are finite, ranges are ordered, and every effect has at least one
 /// start (initial values for its fit) of the right length. Missing starts are derived as in
@@ -43,7 +43,7 @@ pub struct DescriptionSpec {
 ///     trials: vec![TrialSpec::new("monday", 1000, 0.0, false)],
 ///     dt_s: 0.01,
 /// };
-/// assert_eq!(Description::new(spec.clone())?.stages[0].name, "spring");
+/// assert_eq!(Description::new(spec.clone())?.spec().stages[0].name, "spring");
 ///
 /// let wrong = DescriptionSpec { stages: vec![StageSpec::new("spring", "length_mm", "mm", &[1])], ..spec };
 /// let error = Description::new(wrong).unwrap_err();
@@ -101,9 +101,14 @@ impl Description {
     /// [`DescriptionError`] if an index or a length does not match the stages, the parameters or
     /// the trials.
     pub fn with_record(self, record: RecordFacts) -> Result<Self, DescriptionError> {
-        let samples = self.trials.iter().map(|t| t.samples).sum();
-        record.check(self.stages.len(), self.parameters.len(), samples)?;
+        let samples = self.spec.trials.iter().map(|t| t.samples).sum();
+        record.check(self.spec.stages.len(), self.spec.parameters.len(), samples)?;
         Ok(Self { record: Arc::new(record), ..self })
+    }
+
+    /// Returns stages, parameters, effects, trials and sample period.
+    pub fn spec(&self) -> &DescriptionSpec {
+        &self.spec
     }
 
     /// Returns the facts about the recording.
@@ -114,7 +119,7 @@ impl Description {
     /// Returns the number of rows of the recording that the trials contain, and the number of rows
     /// that were read.
     pub fn rows_used(&self) -> RowsUsed {
-        let used = self.trials.iter().map(|t| t.samples).sum();
+        let used = self.spec.trials.iter().map(|t| t.samples).sum();
         self.record.rows_used.unwrap_or(RowsUsed { used, read: used })
     }
 
@@ -147,17 +152,10 @@ impl Description {
         &self,
         altered: impl Fn(usize, &ParameterSpec) -> ParameterSpec,
     ) -> Self {
-        let parameters = self.parameters.iter().enumerate().map(|(i, p)| altered(i, p)).collect();
+        let parameters =
+            self.spec.parameters.iter().enumerate().map(|(i, p)| altered(i, p)).collect();
         let mut out = self.clone();
         out.spec.parameters = parameters;
         out
-    }
-}
-
-impl Deref for Description {
-    type Target = DescriptionSpec;
-
-    fn deref(&self) -> &DescriptionSpec {
-        &self.spec
     }
 }

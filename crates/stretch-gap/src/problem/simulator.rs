@@ -222,23 +222,23 @@ pub(crate) fn on_all_threads<S: Simulator + ?Sized>(
 impl dyn Simulator + '_ {
     /// Stages of the simulator.
     pub fn stages(&self) -> &[StageSpec] {
-        &self.description().stages
+        &self.description().spec().stages
     }
     /// Nominal parameters of the simulator.
     pub fn parameters(&self) -> &[ParameterSpec] {
-        &self.description().parameters
+        &self.description().spec().parameters
     }
     /// The catalogue of effects that the simulator may lack.
     pub fn effects(&self) -> &[EffectSpec] {
-        &self.description().effects
+        &self.description().spec().effects
     }
     /// The trials, in the order of the session.
     pub fn trials(&self) -> &[TrialSpec] {
-        &self.description().trials
+        &self.description().spec().trials
     }
     /// Sample time, s, the same in every trial.
     pub fn dt_s(&self) -> f64 {
-        self.description().dt_s
+        self.description().spec().dt_s
     }
     /// Returns the facts about the recording in addition to the description's lists.
     pub fn record(&self) -> &RecordFacts {

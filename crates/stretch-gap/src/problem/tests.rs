@@ -73,9 +73,9 @@ fn tolerances_told_another_way_leave_the_simulator_as_it_is() {
         _ => p.clone(),
     });
     let (own, other) = (record.description(), held.description());
-    assert_eq!(other.parameters[0].sd, 0.0);
-    assert_eq!(other.parameters[1..], own.parameters[1..]);
-    assert_eq!((&other.trials, held.measured(1)), (&own.trials, record.measured(1)));
+    assert_eq!(other.spec().parameters[0].sd, 0.0);
+    assert_eq!(other.spec().parameters[1..], own.spec().parameters[1..]);
+    assert_eq!((&other.spec().trials, held.measured(1)), (&own.spec().trials, record.measured(1)));
     let model = Model::nominal(&record);
     let [own, other] = [&record as &dyn Simulator, &held].map(|simulator| {
         let runs = Runs::new(simulator, &GO_ON).expect("measured");

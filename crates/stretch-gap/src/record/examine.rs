@@ -181,7 +181,7 @@ fn is_large(suspect: &Altered<'_>, model: &Model, sd: f64) -> bool {
     let sure = |size: f64, least: f64| size.abs() - SURE * sd > least;
     match (fault.kind, column) {
         (Kind::Parameter(p), _) => {
-            let spec = &suspect.description().parameters[p];
+            let spec = &suspect.description().spec().parameters[p];
             (model.parameters[p] * size - spec.nominal).abs() > REACH * spec.sd
         }
         (Kind::Scale, _) => fault.is_beyond(size) || sure(size - 1.0, LEAST),
@@ -192,7 +192,7 @@ fn is_large(suspect: &Altered<'_>, model: &Model, sd: f64) -> bool {
         (Kind::Delay, Some(column)) => {
             let [early, late] = column.skew_s;
             let is_skew = (early - SURE * sd..=late + SURE * sd).contains(&size);
-            sure(size, LEAST_SAMPLES * suspect.description().dt_s) && !is_skew
+            sure(size, LEAST_SAMPLES * suspect.description().spec().dt_s) && !is_skew
         }
         (Kind::Sign, _) => true,
         _ => false,

@@ -137,7 +137,7 @@ impl Gross {
                 let sd = hypothesis.effect_sd.values().flatten().fold(0.0, |a: f64, b| a.max(*b));
                 let is_output = column.output_of.is_some();
                 let units = units(1.0 / size, sd / size, &column.unit).filter(|_| is_output);
-                let is_exact = suspect.description().parameters.iter().all(|p| p.sd == 0.0);
+                let is_exact = suspect.description().spec().parameters.iter().all(|p| p.sd == 0.0);
                 let scaled = if units.is_some() || fault.is_beyond(size) || is_exact && is_output {
                     Self::of_factor(column, size, units, is_exact)
                 } else if size >= 1.0 {
@@ -183,7 +183,7 @@ impl Gross {
     /// Creates the error that a nominal parameter has another value.
     fn of_parameter(about: &Description, parameter: usize, value: f64) -> Self {
         let [simulator, rig] = nouns(about.record().gauge_alone);
-        let ParameterSpec { name, unit, nominal, .. } = &about.parameters[parameter];
+        let ParameterSpec { name, unit, nominal, .. } = &about.spec().parameters[parameter];
         let (found, says, of) = (in_digits(value, 4), in_digits(*nominal, 4), after_number(unit));
         Self {
             what: GrossKind::Parameter,

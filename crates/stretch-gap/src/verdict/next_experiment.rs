@@ -223,7 +223,7 @@ impl Tangent {
         };
         let (values, channels) = run(model)?;
         let (mut slopes, mut bounds) = (Vec::new(), Vec::new());
-        let stages: Vec<usize> = (0..simulator.description().stages.len()).collect();
+        let stages: Vec<usize> = (0..simulator.description().spec().stages.len()).collect();
         for (coordinate, [low, high]) in coordinates(simulator, &stages, model) {
             let x = coordinate.read(model);
             let step = coordinate.probe(x);

@@ -28,7 +28,7 @@ pub(crate) struct Measured {
 impl Measured {
     pub(super) fn new(toy: Toy, x: Vec<f64>, outputs: Vec<Vec<f64>>) -> Self {
         let description = toy.description();
-        let stages = description.stages.iter().enumerate();
+        let stages = description.spec().stages.iter().enumerate();
         let read = stages.map(|(i, spec)| Column {
             read_by: (i + 1..outputs.len()).take(1).collect(),
             ..Column::output(i, spec)
@@ -39,7 +39,7 @@ impl Measured {
             values: x.clone().into(),
             output_of: None,
             read_by: vec![0],
-            ..Column::output(0, &description.stages[0])
+            ..Column::output(0, &description.spec().stages[0])
         };
         let known = RecordFacts {
             is_lost: toy.is_lost.clone(),
@@ -126,7 +126,7 @@ impl Measured {
                 effects: &effects,
                 dt_s: toy.dt_s,
                 step_s: toy.step_s * run.step,
-                start_s: self.description.trials[trial].start_s,
+                start_s: self.description.spec().trials[trial].start_s,
             };
             plant.run(toy.laws[run.stage], &input[range.clone()], &mut out[range]);
         }

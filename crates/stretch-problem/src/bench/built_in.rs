@@ -51,13 +51,13 @@ fn complete<B: BuiltIn>(own: &B, model: &Model, effect: &Effect, values: Vec<f64
     without.effects.retain(|(index, _)| rows[*index].name != effect.name);
     let (measured, unit) = (own.measured(*sensor), own.line_unit(model));
     let mut simulated = vec![0.0; measured.len()];
-    let run = Run::exact(*sensor, &without, about.trials.len());
+    let run = Run::exact(*sensor, &without, about.spec().trials.len());
     if own.simulate(run, &mut simulated).is_err() {
         return values;
     }
     let mut left = Vec::new();
-    for (trial, range) in about.trials.iter().zip(columns.fitted()) {
-        let at = |i: usize| trial.start_s + (i - range.start) as f64 * about.dt_s;
+    for (trial, range) in about.spec().trials.iter().zip(columns.fitted()) {
+        let at = |i: usize| trial.start_s + (i - range.start) as f64 * about.spec().dt_s;
         left.extend(range.clone().map(|i| (at(i), (measured[i] - simulated[i]) / unit)));
     }
     let [amplitude, phase] = sine(line.hertz, &left);
@@ -83,7 +83,7 @@ impl<B: BuiltIn + Debug + Send> Diagnosable for B {
     }
 
     fn sketch(&self, effect: usize, values: &[f64], model: &Model) -> Option<Sketch> {
-        let grid = Grid::samples(self.bench().about.dt_s).ok()?;
+        let grid = Grid::samples(self.bench().about.spec().dt_s).ok()?;
         let effect = self.bench().rows[effect];
         let values = complete(self, model, effect, values.to_vec());
         effect.sketch(&values, &self.surroundings(model, &grid))
@@ -103,7 +103,7 @@ impl<B: BuiltIn + Debug + Send> Diagnosable for B {
             remarks.effects.insert(effect.name().into(), own);
         }
         let mut effects = effects.clone();
-        for (index, values) in chosen.effects(&about.effects) {
+        for (index, values) in chosen.effects(&about.spec().effects) {
             let effect = rows[index];
             let values = complete(self, chosen.model, effect, Self::within(effect, values));
             chosen.describe(effect.name, self.in_words(index), &mut remarks);

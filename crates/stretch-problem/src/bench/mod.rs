@@ -65,7 +65,7 @@ impl Bench {
 
     /// The measured output of a stage, all trials concatenated.
     pub(crate) fn measured(&self, stage: usize) -> &[f64] {
-        self.columns.all(&self.about.stages[stage].channel)
+        self.columns.all(&self.about.spec().stages[stage].channel)
     }
 
     /// The samples of the sensor's signal in one trial from which effects may be estimated.

@@ -51,7 +51,7 @@ const SKEW: &str = "channel_skew";
 /// Range of the delays that the catalogue's skew covers, s; the `usual` range if the catalogue has
 /// no skew.
 pub(crate) fn skew_of(about: &Description, usual: [f64; 2]) -> [f64; 2] {
-    let skew = about.effects.iter().find(|e| e.name == SKEW);
+    let skew = about.spec().effects.iter().find(|e| e.name == SKEW);
     skew.and_then(|e| e.parameters.first()).map_or(usual, |p| [p.min, p.max])
 }
 

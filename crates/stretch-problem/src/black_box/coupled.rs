@@ -153,7 +153,7 @@ fn moved<'a>(
     let stages = session.stages.len();
     let run = |stage: usize, altered: &[Altered]| Inner {
         stage,
-        parameters: problem.description().parameters.iter().map(|p| p.nominal).collect(),
+        parameters: problem.description().spec().parameters.iter().map(|p| p.nominal).collect(),
         effects: problem.off.clone(),
         altered: altered.to_vec(),
         trials: session.trials.len(),

@@ -62,7 +62,7 @@ impl BlackBox {
 
     /// A trial in which one input goes through points and all others rest at their medians.
     fn moved(&self, name: &str, all: &[Driven], moved: Option<(usize, &[(f64, f64)])>) -> Trial {
-        let (samples, dt_s) = (self.problem.session().samples(1), self.description().dt_s);
+        let (samples, dt_s) = (self.problem.session().samples(1), self.description().spec().dt_s);
         let one = |(at, d): (usize, &Driven)| -> Vec<f64> {
             let (low, high) = d.range;
             let span = high - low;
@@ -148,7 +148,7 @@ impl BlackBox {
 impl Laboratory for BlackBox {
     fn experiments(&self) -> Vec<Plan> {
         let all = self.driven();
-        let dt_s = self.description().dt_s;
+        let dt_s = self.description().spec().dt_s;
         let lasts_s = self.problem.session().samples(1) as f64 * dt_s;
         if all.is_empty() || !self.runs.source().takes_inputs() {
             return Vec::new();
@@ -180,7 +180,7 @@ impl Laboratory for BlackBox {
             let values = self.problem.columns.all(&d.name)[..samples].to_vec();
             (d.name, values)
         };
-        even_trial("done", self.description().dt_s, self.driven().into_iter().map(measured))
+        even_trial("done", self.description().spec().dt_s, self.driven().into_iter().map(measured))
     }
 
     fn predict(&self, model: &Model, course: &Trial) -> Result<Vec<Vec<f64>>, GapError> {

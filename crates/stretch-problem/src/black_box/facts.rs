@@ -48,7 +48,7 @@ fn signals(session: &RecordedSession) -> Vec<Recorded> {
 /// The outputs of the stages, and every other column except commands, because a command may stay
 /// constant while the rest moves.
 fn record_columns(about: &Description, session: &RecordedSession) -> Vec<Column<'static>> {
-    let stages = about.stages.iter().enumerate();
+    let stages = about.spec().stages.iter().enumerate();
     let output = |(stage, spec)| Column { skew_s: SKEW_S, ..Column::output(stage, spec) };
     let mut out: Vec<Column<'static>> = stages.map(output).collect();
     for c in &session.columns {

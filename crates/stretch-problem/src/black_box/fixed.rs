@@ -19,7 +19,7 @@ const OWN: [&str; 2] = ["an effect that the simulator has itself", "arguments of
 impl BlackBox {
     /// Writes the values of an effect that was found into the file, so that the effect acts in every run.
     fn add(&self, file: &mut ProblemSpec, effect: usize, values: &[f64]) {
-        let spec = &self.description().effects[effect];
+        let spec = &self.description().spec().effects[effect];
         let named =
             || spec.parameters.iter().map(|p| p.name.to_string()).zip(values.iter().copied());
         match self.problem.acting[effect] {
@@ -72,10 +72,10 @@ impl Diagnosable for BlackBox {
         for (stage, found) in file.stages.iter_mut().zip(&evidence.stages) {
             stage.noise.get_or_insert(significant(found.noise, 4));
         }
-        let is_bare = chosen.effects(&self.description().effects).next().is_none();
+        let is_bare = chosen.effects(&self.description().spec().effects).next().is_none();
         let tuned = file.parameters.iter_mut().zip(&chosen.model.parameters).enumerate();
         for (index, (parameter, value)) in tuned {
-            if self.description().parameters[index].sd == 0.0 {
+            if self.description().spec().parameters[index].sd == 0.0 {
                 continue;
             }
             let remark = chosen.remark(index, &parameter.unit, (parameter.value, *value));
@@ -88,8 +88,8 @@ impl Diagnosable for BlackBox {
             }
         }
         let mut effects = Vec::new();
-        for (effect, values) in chosen.effects(&self.description().effects) {
-            let name = &self.description().effects[effect].name;
+        for (effect, values) in chosen.effects(&self.description().spec().effects) {
+            let name = &self.description().spec().effects[effect].name;
             chosen.describe(name, self.in_words(effect), &mut remarks);
             self.add(&mut file, effect, values);
             effects.push(name.clone());

@@ -77,17 +77,17 @@ impl BlackBox {
     /// stage differ from the nominal values.
     pub(super) fn driven_by(&self, run: &Run<'_>, altered: Vec<Altered>) -> Inner {
         let about = self.problem.description();
-        let mut parameters: Vec<f64> = about.parameters.iter().map(|p| p.nominal).collect();
+        let mut parameters: Vec<f64> = about.spec().parameters.iter().map(|p| p.nominal).collect();
         if self.is_coupled() {
             parameters.clone_from(&run.model.parameters);
         } else {
-            for &p in &about.stages[run.stage].parameters {
+            for &p in &about.spec().stages[run.stage].parameters {
                 parameters[p] = run.model.parameters[p];
             }
         }
         let mut effects = self.problem.off.clone();
         for (effect, values) in &run.model.effects {
-            let touches = about.effects[*effect].touches.contains(&run.stage);
+            let touches = about.spec().effects[*effect].touches.contains(&run.stage);
             if let Acting::Own(first) = self.problem.acting[*effect]
                 && touches
             {

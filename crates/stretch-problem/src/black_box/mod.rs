@@ -136,7 +136,7 @@ impl BlackBox {
     ///   wrappers that always act in front of stages, if there are both;
     /// - one repeated run.
     pub fn least_runs(&self) -> usize {
-        let stages = &self.problem.description().stages;
+        let stages = &self.problem.description().spec().stages;
         let each = stages.iter().map(|spec| 1 + spec.parameters.len());
         let stands = self.problem.standing.iter().any(|(at, _)| self.problem.is_in_front(*at));
         let probes = self.probes.len();
@@ -181,7 +181,7 @@ impl BlackBox {
         let Some((near, line)) = line.filter(|(_, line)| line.trials() >= run.trials) else {
             return (inner, None);
         };
-        let own = &self.problem.description().stages[run.stage].parameters;
+        let own = &self.problem.description().spec().stages[run.stage].parameters;
         if own.iter().all(|&p| near[p] == inner.parameters[p]) {
             return (inner, None);
         }
@@ -218,7 +218,7 @@ impl BlackBox {
         let (measured, noise) = (self.measured(stage), self.problem.recorded[stage].noise.sd());
         let end = out.len();
         for range in self.problem.columns.looked_at().into_iter().filter(|r| r.end <= end) {
-            let (samples, dt_s) = (&measured[range.clone()], self.description().dt_s);
+            let (samples, dt_s) = (&measured[range.clone()], self.description().spec().dt_s);
             find(values, &Measured { samples, noise, unit: 1.0, dt_s }, &mut out[range]);
         }
     }
@@ -285,11 +285,11 @@ impl Simulator for BlackBox {
         let stage = run.stage;
         let inner = self.inner(&run);
         let about = self.problem.description();
-        let own = &about.stages[stage].parameters;
-        if self.line(stage).is_some_and(|line| line.serves(&inner, own, &about.parameters)) {
+        let own = &about.spec().stages[stage].parameters;
+        if self.line(stage).is_some_and(|line| line.serves(&inner, own, &about.spec().parameters)) {
             return Ok(());
         }
-        let moves = Linear::moves(&inner, own, &about.parameters);
+        let moves = Linear::moves(&inner, own, &about.spec().parameters);
         let wanted: Vec<Inner> =
             std::iter::once(&inner).chain(moves.iter().map(|m| &m.inner)).cloned().collect();
         let outputs = self.runs.outputs(&wanted, self.kept_back(&run));
@@ -321,7 +321,7 @@ impl Simulator for BlackBox {
     }
 
     fn lines(&self, stage: usize, model: &Model) -> Vec<Line> {
-        let effects = &self.problem.description().effects;
+        let effects = &self.problem.description().spec().effects;
         let is_here = |effect: usize| effects[effect].touches.contains(&stage);
         let found = model.effects.iter().filter(|(effect, _)| is_here(*effect));
         let found = found.filter_map(|(effect, v)| Some((self.problem.wrapper(*effect)?, v)));

@@ -60,7 +60,7 @@ impl Undeclared {
         let mut known = self.others.lock().unwrap_or_else(PoisonError::into_inner);
         for stage in 0..session.stages.len() {
             let is_new = |m: &&Move| {
-                let is_declared = about.stages[stage].parameters.contains(&m.parameter);
+                let is_declared = about.spec().stages[stage].parameters.contains(&m.parameter);
                 !is_declared && !known.contains_key(&(m.parameter, stage))
             };
             let new: Vec<&Move> = moves.iter().filter(is_new).collect();
@@ -71,7 +71,7 @@ impl Undeclared {
             };
             for m in new {
                 let Some(there) = output(&m.inner) else { continue };
-                let share = about.parameters[m.parameter].sd / m.step.abs();
+                let share = about.spec().parameters[m.parameter].sd / m.step.abs();
                 known.insert((m.parameter, stage), apart(&there, &here) * share / noise);
             }
         }
@@ -84,21 +84,23 @@ impl Undeclared {
         let known = self.others.lock().unwrap_or_else(PoisonError::into_inner);
         let unmoved = self.unmoved.lock().unwrap_or_else(PoisonError::into_inner);
         let ignored = unmoved.iter().filter(|(_, is_unmoved)| **is_unmoved).map(|(&stage, _)| {
-            let own = about.stages[stage].parameters.iter().map(|&p| &about.parameters[p]);
+            let own = about.spec().stages[stage].parameters.iter().map(|&p| &about.spec().parameters[p]);
             let tuned = own.filter(|p| p.sd > 0.0).map(|p| p.name.clone());
             format!(
                 "the simulator ignores the parameters of {}: its output is bit for bit the same for all values of {}; nothing could be re-tuned \
                  there, so check that the simulator uses them",
-                about.stages[stage].name,
+                about.spec().stages[stage].name,
                 listed(&tuned.collect::<Vec<_>>())
             )
         });
         let mut alike: Vec<Alike<'_>> = Vec::new();
         for (&(parameter, stage), &multiple) in known.iter().filter(|(_, m)| **m > LEAST) {
-            let said = about.stages.iter().filter(|s| s.parameters.contains(&parameter));
+            let said = about.spec().stages.iter().filter(|s| s.parameters.contains(&parameter));
             let said: Vec<&str> = said.map(|s| s.name.as_str()).collect();
-            let (name, moves) =
-                (about.parameters[parameter].name.as_str(), &*about.stages[stage].name);
+            let (name, moves) = (
+                about.spec().parameters[parameter].name.as_str(),
+                &*about.spec().stages[stage].name,
+            );
             match alike.iter_mut().find(|a| a.moves == moves && a.said == said) {
                 Some(alike) => alike.own.push((multiple, name)),
                 None => alike.push(Alike { said, moves, own: vec![(multiple, name)] }),

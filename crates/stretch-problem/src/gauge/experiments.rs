@@ -50,7 +50,7 @@ impl GaugeSimulator {
         if KNOWN.contains(&trial.name.as_str()) {
             effects = effects.only(|effect| effect.stage != RigStage::Reference);
         }
-        let gauge = Gauge::new(self.tuned(model), &effects, self.bench.about.dt_s)?;
+        let gauge = Gauge::new(self.tuned(model), &effects, self.bench.about.spec().dt_s)?;
         let reference = trial.require(&self.set_reference())?;
         let mut signal = vec![0.0; reference.len()];
         // Without a pressure column there is no effect of pressure either.
@@ -78,18 +78,18 @@ impl GaugeSimulator {
         };
         let columns = [(self.set_reference(), reference)].into_iter();
         let columns = columns.chain(pressure.map(applied));
-        let trial = even_trial(name, self.bench.about.dt_s, columns);
+        let trial = even_trial(name, self.bench.about.spec().dt_s, columns);
         Plan { how: how.to_owned(), prepare_min, trial }
     }
 }
 
 impl Laboratory for GaugeSimulator {
     fn experiments(&self) -> Vec<Plan> {
-        let dt_s = self.bench.about.dt_s;
+        let dt_s = self.bench.about.spec().dt_s;
         let columns = &self.bench.columns;
         // The reference moves no faster than it was recorded.
         let least_s = self.spec.span.abs() / columns.fastest(&columns.values[REFERENCE]);
-        let most = self.bench.about.trials[0].samples.max((LONGEST_S / dt_s) as usize);
+        let most = self.bench.about.spec().trials[0].samples.max((LONGEST_S / dt_s) as usize);
         let moving = moving().into_iter().map(|(name, how, points)| ((name, how, 0.25), points));
         let all = moving.chain(still()).map(|(head, points)| {
             self.plan(head, course(&paced(&points, least_s), dt_s).take(most), None)
@@ -107,7 +107,7 @@ impl Laboratory for GaugeSimulator {
 
     /// The first minute of the recording.
     fn done(&self) -> Trial {
-        let dt_s = self.bench.about.dt_s;
+        let dt_s = self.bench.about.spec().dt_s;
         let mut reference = self.input.trial(0, None);
         reference.truncate((60.0 / dt_s) as usize);
         even_trial("done", dt_s, [(self.set_reference(), reference)])

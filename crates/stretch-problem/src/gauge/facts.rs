@@ -25,7 +25,7 @@ pub(super) fn facts(Bench { about, columns, .. }: &Bench, driving: Vec<f64>) -> 
     let signal = Column {
         skew_s: skew_of(about, SKEW_S),
         hint: Cow::Borrowed("the gauge, its wires and its amplifier"),
-        ..Column::output(0, &about.stages[0])
+        ..Column::output(0, &about.spec().stages[0])
     };
     let reference = Column {
         name: Cow::Owned(name.clone()),

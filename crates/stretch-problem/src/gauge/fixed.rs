@@ -44,7 +44,8 @@ impl BuiltIn for GaugeSimulator {
             (OFFSET, "offset", (self.spec.offset, spec.offset)),
             (GAIN, "gain", (self.spec.gain, spec.gain)),
         ] {
-            let remark = chosen.remark(index, &self.bench.about.parameters[index].unit, values);
+            let remark =
+                chosen.remark(index, &self.bench.about.spec().parameters[index].unit, values);
             remarks.parameters.insert((TABLE.into(), name.into()), remark);
         }
         let file = rig.to_file();

@@ -128,7 +128,7 @@ fn record_columns(about: &Description, stage_kinds: &[RigStage]) -> Vec<Column<'
             read_by,
             skew_s,
             hint: Cow::Borrowed(hint),
-            ..Column::output(stage, &about.stages[stage])
+            ..Column::output(stage, &about.spec().stages[stage])
         }
     };
     let commanded =
@@ -142,7 +142,7 @@ fn record_columns(about: &Description, stage_kinds: &[RigStage]) -> Vec<Column<'
         hint: Cow::Borrowed(
             "the scale on which commands are written, the valves' supply, and the volume and the conductances in the rig file",
         ),
-        ..Column::output(0, &about.stages[0])
+        ..Column::output(0, &about.spec().stages[0])
     };
     stage_kinds.iter().enumerate().map(output).chain([commands]).collect()
 }

@@ -57,7 +57,7 @@ pub(super) fn simulate(
     let is_sensor = kind == RigStage::Sensing;
     let initial_share = if is_sensor { tuned.initial_gauge } else { tuned.initial_muscle };
     let acting = rig.bench.acting(run.model)?;
-    let dt_s = rig.bench.about.dt_s;
+    let dt_s = rig.bench.about.spec().dt_s;
     let step_s = run.step * STEP_S;
     let grid = match kind {
         // These stages are driven by a measured input.
@@ -109,11 +109,11 @@ impl Setting<'_> {
     }
 
     pub(super) fn after_pause(&self, trial: usize) -> Start {
-        let trials = &self.rig.bench.about.trials;
+        let trials = &self.rig.bench.about.spec().trials;
         let rest_s = match trial.checked_sub(1) {
             Some(before) => {
                 let end = trials[before].start_s
-                    + trials[before].samples as f64 * self.rig.bench.about.dt_s;
+                    + trials[before].samples as f64 * self.rig.bench.about.spec().dt_s;
                 trials[trial].start_s - end
             }
             None => 15.0,
@@ -364,7 +364,7 @@ impl Setting<'_> {
             stage.run(
                 &mut memory,
                 Start::Settled,
-                self.rig.bench.about.trials[0].start_s,
+                self.rig.bench.about.spec().trials[0].start_s,
                 &vec![before; nodes],
                 &vec![kpa; nodes],
                 &mut volts,
@@ -378,7 +378,7 @@ impl Setting<'_> {
                 &mut memory,
                 stage.memory(),
                 |memory, start| {
-                    let start_s = self.rig.bench.about.trials[0].start_s;
+                    let start_s = self.rig.bench.about.spec().trials[0].start_s;
                     Ok(stage.run(memory, start, start_s, &length, &pressure, &mut volts)?)
                 },
             )?;
@@ -395,7 +395,7 @@ impl Setting<'_> {
                 true => self.pressure(trial).unwrap_or_else(|| pressures[trial].clone()),
                 false => Vec::new(),
             };
-            let start_s = self.rig.bench.about.trials[trial].start_s;
+            let start_s = self.rig.bench.about.spec().trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
             let stage = dimmed.get(trial).and_then(Option::as_ref).unwrap_or(&stage);
             stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
@@ -429,7 +429,7 @@ impl Setting<'_> {
     }
 
     fn shown(&self, effects: &EffectSet) -> Result<ReferenceSensor, ProblemError> {
-        ReferenceSensor::new(&self.tuned.params, effects, self.rig.bench.about.dt_s)
+        ReferenceSensor::new(&self.tuned.params, effects, self.rig.bench.about.spec().dt_s)
     }
 }
 

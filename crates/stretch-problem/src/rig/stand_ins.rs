@@ -62,9 +62,9 @@ impl Setting<'_> {
         let effects = self.effects.only(|e| !e.hides_input());
         let has_pressure = self.rig.inputs.pressure.is_some();
         let grid = if has_pressure {
-            Grid::samples(self.rig.bench.about.dt_s)?
+            Grid::samples(self.rig.bench.about.spec().dt_s)?
         } else {
-            effects.grid(&self.tuned.params, self.rig.bench.about.dt_s, self.step_s)?
+            effects.grid(&self.tuned.params, self.rig.bench.about.spec().dt_s, self.step_s)?
         };
         let initial_share = self.tuned.initial_muscle;
         let without = Setting { effects, grid, initial_share, ..*self };
@@ -80,7 +80,8 @@ impl Setting<'_> {
     /// Pressure of the nominal pneumatics, kPa, for recordings without a pressure column.
     pub(super) fn simulated_pressure(&self, count: usize) -> Result<Arc<ByTrial>, ProblemError> {
         let effects = self.rig.bench.effects.clone();
-        let grid = effects.grid(&self.tuned.params, self.rig.bench.about.dt_s, self.step_s)?;
+        let grid =
+            effects.grid(&self.tuned.params, self.rig.bench.about.spec().dt_s, self.step_s)?;
         let others = self.begun(count);
         let key = causes(&[RigStage::Pneumatics], &self.tuned.params, &effects, &grid, others);
         let nominal = Setting { effects, grid, ..*self };

@@ -164,7 +164,7 @@ fn all_has_no_crosstalk_from_the_only_input() {
         let checked = Checked::new(problem(recorded(|u, _| plain(u, 0.0)), &[wrap])).unwrap();
         let source = closure(|_: &Ask<'_>| Ok(Vec::new()));
         let bench = BlackBox::new(checked, Arc::new(source));
-        bench.description().effects.iter().any(|e| e.name == "output.crosstalk(command_V)")
+        bench.description().spec().effects.iter().any(|e| e.name == "output.crosstalk(command_V)")
     };
     assert!(!has_crosstalk("all") && has_crosstalk("output.crosstalk"));
 }

@@ -21,7 +21,7 @@ pub(super) fn check(path: &Path, force: bool) -> Result<(), FileError> {
         Ok(mut entries) => entries.next().is_none(),
         Err(_) => fs::symlink_metadata(path).is_err(),
     };
-    if !is_free && !(force && path.is_dir()) {
+    if !(is_free || force && path.is_dir()) {
         return Err(FileError::exists(path));
     }
     let is_inside = |here: PathBuf| fs::canonicalize(path).is_ok_and(|path| here.starts_with(path));

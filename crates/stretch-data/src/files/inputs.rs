@@ -140,15 +140,14 @@ pub fn is_input(path: impl AsRef<Path>) -> io::Result<()> {
     let path = path.as_ref();
     let mut guard = guard();
     let (Some(guard), Some(own)) = (guard.as_mut(), identity_of_file(path)) else { return Ok(()) };
-    // Registered before the check, so that a caller who ignores the error still cannot overwrite
-    // the file.
-    guard.inputs.insert(own.clone(), path.to_owned());
-    match guard.outputs.iter().find(|output| output.file.as_ref() == Some(&own)) {
-        Some(Output { shown, .. }) => Err(io::Error::other(format!(
-            "{shown} would overwrite it, and the command reads it; choose another output file"
-        ))),
-        None => Ok(()),
-    }
+    let output = guard.outputs.iter().find(|output| output.file.as_ref() == Some(&own));
+    let refused = output.map(|Output { shown, .. }| {
+        format!("{shown} would overwrite it, and the command reads it; choose another output file")
+    });
+    // Also registered if it is refused, so that a caller who ignores the error still cannot
+    // overwrite the file.
+    guard.inputs.insert(own, path.to_owned());
+    refused.map_or(Ok(()), |why| Err(io::Error::other(why)))
 }
 
 /// Permits that a file is overwritten after it was read, because the command updates it in place.

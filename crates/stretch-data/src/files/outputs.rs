@@ -1,7 +1,7 @@
 //! Output of one file, one folder, or several that belong together.
 
 use std::{
-    fs,
+    fs::{self, Metadata},
     io::{self, BufWriter, Write},
     path::Path,
 };
@@ -132,14 +132,10 @@ impl Outputs {
         path: &Path,
         fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
     ) -> io::Result<()> {
-        let meta = match fs::metadata(path) {
-            Ok(meta) if meta.is_dir() => {
-                return Err(io::Error::other("it is a folder; name a file"));
-            }
-            Ok(meta) => Some(meta),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => None,
-            Err(e) => return Err(e),
-        };
+        let meta = fs::metadata(path).ok();
+        if meta.as_ref().is_some_and(Metadata::is_dir) {
+            return Err(io::Error::other("it is a folder; name a file"));
+        }
         if let Some(stream) = open_stream(path, meta.as_ref())? {
             let mut out = BufWriter::new(stream);
             let written = fill(&mut out).and_then(|()| out.flush());

@@ -139,7 +139,7 @@ for triple in $TARGETS; do
     for crate in $BOARDS; do
         cargo check --quiet --locked -p "$crate" --no-default-features --target "$triple"
     done
-    cargo check --quiet --locked -p stretch-core --features record --target "$triple"
+    cargo check --quiet --locked -p stretch-core --features serde --target "$triple"
     # the feature of these three turns on that of the others
     cargo check --quiet --locked -p stretch-fit -p stretch-link -p stretch-sleeve --no-default-features --features defmt --target "$triple"
     echo "$triple:" $BOARDS

@@ -11,9 +11,7 @@ use stretch_calibrate::{
     BoardReceptor, calibration_from_edited_json, calibration_from_json, calibration_to_json,
     fixed_record, parse_adc, read_calibration,
 };
-use stretch_core::{
-    Calibration, CalibrationSpec, DesignError, Interval, Model, record, strategies,
-};
+use stretch_core::{Calibration, CalibrationSpec, DesignError, Interval, Model, record};
 use stretch_receptor::{
     code::{FixedCalibration, FixedObserver},
     example_calibration, example_observer,
@@ -24,7 +22,8 @@ fn kinds() -> Vec<Calibration> {
     let mut runner = TestRunner::deterministic();
     let mut found = BTreeMap::new();
     while found.len() < 5 {
-        let calibration = strategies::calibration().new_tree(&mut runner).unwrap().current();
+        let calibration =
+            stretch_strategies::calibration().new_tree(&mut runner).unwrap().current();
         found.entry(calibration.spec().model.name()).or_insert(calibration);
     }
     found.into_values().collect()

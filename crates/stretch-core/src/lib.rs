@@ -20,14 +20,12 @@ mod provenance;
 mod range;
 mod rate;
 mod real;
-#[cfg(feature = "record")]
+#[cfg(feature = "serde")]
 pub mod record;
 mod rest;
 mod rest_level;
 pub mod sizes;
 mod stage;
-#[cfg(feature = "proptest")]
-pub mod strategies;
 mod surface;
 mod unit;
 mod values;

@@ -5,7 +5,6 @@ use proptest::prelude::*;
 use stretch_core::{
     Poly13, Range,
     fixed::{FixedLine, FixedPoly13, FixedRange, RangeUnits, saturate},
-    strategies,
 };
 use testkit::tolerance as tol;
 
@@ -121,7 +120,7 @@ proptest! {
 
     #[test]
     fn a_range_is_the_real_one_saturated(
-        range in strategies::range(), step in 1e-4..1.0f64, zero in -10.0..10.0f64, x: i32,
+        range in stretch_strategies::range(), step in 1e-4..1.0f64, zero in -10.0..10.0f64, x: i32,
     ) {
         let Ok(fixed) = FixedRange::new(&range, RangeUnits { zero, step }) else {
             return Ok(());
@@ -149,7 +148,7 @@ proptest! {
     }
 
     #[test]
-    fn a_range_brings_codes_back(range in strategies::range(), code in 0..65_536i32) {
+    fn a_range_brings_codes_back(range in stretch_strategies::range(), code in 0..65_536i32) {
         // a 16-bit converter whose input span is three times the range, with the range in the middle
         let step = 3.0 * range.span() / 65_535.0;
         let units = RangeUnits { zero: range.min() - range.span(), step };

@@ -4,7 +4,7 @@ use approx::assert_abs_diff_eq;
 use proptest::prelude::*;
 use stretch_core::{
     Branch, Calibration, CalibrationSpec, Degree, DesignError, Normalisation, Poly13, Range,
-    RangeSpec, Real, Surface, strategies,
+    RangeSpec, Real, Surface,
 };
 use testkit::tolerance as tol;
 
@@ -16,7 +16,7 @@ fn naive(surface: &Surface, rate: f64, volts: f64) -> f64 {
 
 proptest! {
     #[test]
-    fn normalise_and_back(range in strategies::range(), n in -2.0..2.0) {
+    fn normalise_and_back(range in stretch_strategies::range(), n in -2.0..2.0) {
         let x = range.denormalise(n);
         let scale = (range.offset().abs() + range.span()) / range.span();
         assert_abs_diff_eq!(
@@ -27,7 +27,7 @@ proptest! {
     }
 
     #[test]
-    fn min_max_maps_its_ends_to_zero_and_one(range in strategies::range()) {
+    fn min_max_maps_its_ends_to_zero_and_one(range in stretch_strategies::range()) {
         let spec = RangeSpec { mode: Normalisation::MinMax, ..range.into() };
         let range = Range::new(spec).unwrap();
         prop_assert_eq!(range.normalise(spec.min), 0.0);
@@ -35,7 +35,7 @@ proptest! {
     }
 
     #[test]
-    fn normalise_rises(range in strategies::range(), a in -1e3..1e3, b in -1e3..1e3) {
+    fn normalise_rises(range in stretch_strategies::range(), a in -1e3..1e3, b in -1e3..1e3) {
         let (low, high) = if a < b { (a, b) } else { (b, a) };
         prop_assert!(range.normalise(low) <= range.normalise(high));
         prop_assert!(range.contains(range.clamp(a)));
@@ -43,7 +43,7 @@ proptest! {
 
     #[test]
     fn horner_equals_the_sum_of_terms(
-        surface in strategies::surface(), rate in -2.0..2.0, volts in -2.0..2.0,
+        surface in stretch_strategies::surface(), rate in -2.0..2.0, volts in -2.0..2.0,
     ) {
         let (found, exact) = (surface.eval(rate, volts), naive(&surface, rate, volts));
         assert_abs_diff_eq!(found, exact, epsilon = tol::HORNER);
@@ -51,7 +51,7 @@ proptest! {
 
     #[test]
     fn partial_derivatives_are_the_slopes(
-        surface in strategies::surface(), rate in -1.0..1.0, volts in -1.0..1.0,
+        surface in stretch_strategies::surface(), rate in -1.0..1.0, volts in -1.0..1.0,
     ) {
         let h = 1e-5;
         let by_rate = (naive(&surface, rate + h, volts) - naive(&surface, rate - h, volts)) / (2.0 * h);
@@ -64,7 +64,7 @@ proptest! {
 
     #[test]
     fn poly13_and_the_general_surface_agree(
-        surface in strategies::surface_of(Degree::POLY13), rate in -2.0..2.0, volts in -2.0..2.0,
+        surface in stretch_strategies::surface_of(Degree::POLY13), rate in -2.0..2.0, volts in -2.0..2.0,
     ) {
         let poly: Poly13 = surface.as_poly13().unwrap();
         prop_assert_eq!(Surface::from(poly), surface);
@@ -82,14 +82,14 @@ proptest! {
     }
 
     #[test]
-    fn coefficients_survive(surface in strategies::surface()) {
+    fn coefficients_survive(surface in stretch_strategies::surface()) {
         let terms = surface.degree().terms();
         let again = Surface::new(surface.degree(), &surface.coefficients()[..terms]).unwrap();
         prop_assert_eq!(again, surface);
     }
 
     #[test]
-    fn the_term_set_is_matlabs(degree in strategies::degree()) {
+    fn the_term_set_is_matlabs(degree in stretch_strategies::degree()) {
         let exponents: Vec<_> = degree.exponents().collect();
         prop_assert_eq!(exponents.len(), degree.terms());
         let most = degree.rate().max(degree.volts());
@@ -117,7 +117,7 @@ proptest! {
     }
 
     #[test]
-    fn json_and_postcard_keep_every_bit(calibration in strategies::calibration()) {
+    fn json_and_postcard_keep_every_bit(calibration in stretch_strategies::calibration()) {
         let json = serde_json::to_string(&calibration).unwrap();
         prop_assert_eq!(&serde_json::from_str::<Calibration>(&json).unwrap(), &calibration);
         let mut buffer = [0; 4096];
@@ -127,7 +127,7 @@ proptest! {
 
     #[test]
     fn a_truncated_or_damaged_record_never_panics(
-        calibration in strategies::calibration(), cut in 0usize..1500, at in 0usize..1500, byte: u8,
+        calibration in stretch_strategies::calibration(), cut in 0usize..1500, at in 0usize..1500, byte: u8,
     ) {
         let mut buffer = [0; 4096];
         let bytes = postcard::to_slice(&calibration, &mut buffer).unwrap();

@@ -2,14 +2,15 @@
 
 use proptest::{prelude::*, strategy::ValueTree, test_runner::TestRunner};
 use serde_json::{Value, json};
-use stretch_core::{Calibration, CalibrationSpec, Degree, DesignError, Model, Surface, strategies};
+use stretch_core::{Calibration, CalibrationSpec, Degree, DesignError, Model, Surface};
 
 /// Returns a valid calibration in JSON, whose model is one with surfaces. Tests spoil a field of
 /// it.
 fn record() -> Value {
     let mut runner = TestRunner::deterministic();
     loop {
-        let calibration = strategies::calibration().new_tree(&mut runner).unwrap().current();
+        let calibration =
+            stretch_strategies::calibration().new_tree(&mut runner).unwrap().current();
         if matches!(calibration.spec().model, Model::Surfaces { .. }) {
             return serde_json::to_value(calibration).unwrap();
         }
@@ -89,7 +90,8 @@ fn a_removed_model_is_refused_by_name_in_text_and_in_bytes() {
     assert_eq!(Calibration::new(read), Err(DesignError::Removed { model: "blended" }));
     let mut runner = TestRunner::deterministic();
     for _ in 0..64 {
-        let model = strategies::calibration().new_tree(&mut runner).unwrap().current().spec().model;
+        let model =
+            stretch_strategies::calibration().new_tree(&mut runner).unwrap().current().spec().model;
         let number = match model {
             Model::Linear(_) => 0,
             Model::Surfaces { .. } => 1,
@@ -138,7 +140,8 @@ fn two_poly13_surfaces_take_about_400_bytes() {
     let mut runner = TestRunner::deterministic();
     let mut buffer = [0; 4096];
     loop {
-        let calibration = strategies::calibration().new_tree(&mut runner).unwrap().current();
+        let calibration =
+            stretch_strategies::calibration().new_tree(&mut runner).unwrap().current();
         if let Model::Surfaces { inflation, deflation } = calibration.spec().model
             && inflation.surface.degree() == Degree::POLY13
             && deflation.surface.degree() == Degree::POLY13

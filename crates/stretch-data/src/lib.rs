@@ -9,8 +9,6 @@ mod even;
 mod even_session;
 pub mod files;
 mod rig_file;
-#[cfg(feature = "proptest")]
-pub mod strategies;
 mod toml_file;
 mod toml_text;
 mod trial;

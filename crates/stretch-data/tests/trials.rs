@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use stretch_data::{
     Channel, EvenSession, EvenSpec, SessionTrial, Trial, digest_of, ends, is_digest, listed,
-    nearest, push_number, rate_of, strategies, tidy_time, unit,
+    nearest, push_number, rate_of, tidy_time, unit,
 };
 
 use crate::cases;
@@ -108,7 +108,7 @@ proptest! {
 
     /// A checksum depends on every value and its place, but not on name and time.
     #[test]
-    fn a_checksum_tells_values_and_places(trial in strategies::rig_trial(2..40), at in any::<prop::sample::Index>(), later_s in 0.0..1e3_f64) {
+    fn a_checksum_tells_values_and_places(trial in stretch_strategies::rig_trial(2..40), at in any::<prop::sample::Index>(), later_s in 0.0..1e3_f64) {
         let both = ["length_mm", "bridge_v"];
         let sum = trial.checksum(&both);
         prop_assert!(sum.is_some() && trial.checksum(&["length_mm", "none"]).is_none());
@@ -125,7 +125,7 @@ proptest! {
     /// A trial that a file can hold is refused once a channel is too short, time decreases, or a
     /// value is not a number.
     #[test]
-    fn a_trial_with_a_fault_is_refused(trial in strategies::rig_trial(3..20), at in any::<prop::sample::Index>(), fault in 0..4) {
+    fn a_trial_with_a_fault_is_refused(trial in stretch_strategies::rig_trial(3..20), at in any::<prop::sample::Index>(), fault in 0..4) {
         prop_assert!(trial.check().is_ok());
         let at = at.index(trial.len() - 1);
         let mut faulty = trial;
@@ -141,7 +141,7 @@ proptest! {
 
     /// A number reads back to the same bits.
     #[test]
-    fn numbers_keep_their_bits(x in strategies::number()) {
+    fn numbers_keep_their_bits(x in stretch_strategies::number()) {
         let mut line = Vec::new();
         push_number(&mut line, x);
         let text = String::from_utf8(line).expect("digits");

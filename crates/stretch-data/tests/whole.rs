@@ -10,7 +10,6 @@ use proptest::prelude::*;
 use stretch_data::{
     DataSet, Split, TrialEntry, TrialKind,
     files::{FileError, Outputs, read_whole, write_folder, write_whole},
-    strategies,
 };
 
 use crate::cases;
@@ -136,7 +135,7 @@ proptest! {
     /// A written data set reads back, with digests that detect every change of a trial's file.
     #[test]
     fn a_data_set_on_the_disk_is_checked_byte_by_byte(
-        trials in prop::collection::vec(strategies::rig_trial(2..20), 1..4),
+        trials in prop::collection::vec(stretch_strategies::rig_trial(2..20), 1..4),
         which in any::<prop::sample::Index>(),
         at in any::<prop::sample::Index>(),
         change in 1..=255_u8,

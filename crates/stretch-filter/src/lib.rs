@@ -2,9 +2,6 @@
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![no_std]
 
-#[cfg(feature = "proptest")]
-extern crate std;
-
 mod biquad;
 mod cadence;
 mod cost;
@@ -23,8 +20,6 @@ mod rate_filter;
 mod sample;
 mod savgol;
 mod sg_filter;
-#[cfg(feature = "proptest")]
-pub mod strategies;
 mod tracker;
 
 pub use biquad::{Biquad, BiquadMemory, BiquadSpec};

@@ -6,7 +6,7 @@ use stretch_core::{Runner, SampleRate, Seconds};
 use stretch_filter::log::{
     Between, Grid, LocalFit, central_difference, local_polynomial, resample,
 };
-use stretch_filter::{Arrival, Cadence, FilterError, SgFilter, SgShape, strategies};
+use stretch_filter::{Arrival, Cadence, FilterError, SgFilter, SgShape};
 use testkit::tolerance;
 
 const HZ: f64 = 100.0;
@@ -24,7 +24,7 @@ proptest! {
 
     #[test]
     fn local_fits_are_exact_on_polynomials_at_uneven_times(
-        times in strategies::uneven_times(40, 1.0 / HZ), signal in strategies::polynomial(3),
+        times in stretch_strategies::uneven_times(40, 1.0 / HZ), signal in stretch_strategies::polynomial(3),
     ) {
         let log: Vec<f64> = times.iter().map(|&t| signal.value(t)).collect();
         let mut out = vec![None; log.len()];
@@ -56,8 +56,8 @@ proptest! {
 
     #[test]
     fn resampling_is_exact_on_its_own_polynomials(
-        times in strategies::uneven_times(30, 1.0 / HZ),
-        line in strategies::polynomial(1), cubic in strategies::polynomial(3),
+        times in stretch_strategies::uneven_times(30, 1.0 / HZ),
+        line in stretch_strategies::polynomial(1), cubic in stretch_strategies::polynomial(3),
     ) {
         let grid = Grid { start: Seconds(0.0), sample_rate: hundred() };
         let points = grid.points_until(Seconds(times[29]));
@@ -78,7 +78,7 @@ proptest! {
 
     #[test]
     fn bad_logs_are_refused_and_nothing_is_written(
-        mut times in strategies::uneven_times(20, 0.01), at in 1_usize..20, back in 0.0..1.0,
+        mut times in stretch_strategies::uneven_times(20, 0.01), at in 1_usize..20, back in 0.0..1.0,
     ) {
         times[at] = times[at - 1] - back;
         let log = vec![1.0; 20];

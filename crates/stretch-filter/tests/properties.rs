@@ -3,11 +3,11 @@
 use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::prelude::*;
 use stretch_core::{Hertz, RateEstimator, Runner, SampleRate, Stage};
-use stretch_filter::strategies::{self, Signal};
 use stretch_filter::{
     Biquad, BiquadSpec, Differentiator, FilterError, LowPass, LowPassSpec, MAX_SG_DEGREE,
     RateFilter, SgFilter, SgRate, SgShape, SgSmooth, Tracker, TrackerSpec,
 };
+use stretch_strategies::Signal;
 use testkit::tolerance;
 
 const HZ: f64 = 100.0;
@@ -138,7 +138,7 @@ proptest! {
     #[test]
     fn every_live_estimator_is_linear(
         estimator in live_estimator(), gain in -3.0..3.0_f64,
-        (a, b) in (strategies::sines(10.0), strategies::sines(10.0)),
+        (a, b) in (stretch_strategies::sines(10.0), stretch_strategies::sines(10.0)),
     ) {
         let design = RateFilter::<f64>::new(estimator, hundred()).unwrap();
         let count = design.warm_up() + 60;
@@ -156,7 +156,7 @@ proptest! {
 
     #[test]
     fn faulty_samples_never_enter_a_memory(
-        estimator in live_estimator(), stream in strategies::faulty_stream(200),
+        estimator in live_estimator(), stream in stretch_strategies::faulty_stream(200),
     ) {
         let design = RateFilter::<f64>::new(estimator, hundred()).unwrap();
         let low_pass = spec(5.0).design::<f64, 4>().unwrap();
@@ -179,7 +179,7 @@ proptest! {
     }
 
     #[test]
-    fn f32_follows_f64(signal in strategies::sines(8.0)) {
+    fn f32_follows_f64(signal in stretch_strategies::sines(8.0)) {
         let x = signal.samples(200, 1.0 / HZ);
         let (mut sg, mut sg32) = (
             Runner::new(SgRate::<f64, 11, 2>::new(hundred()).unwrap()),

@@ -15,8 +15,6 @@ mod robust;
 mod sample;
 mod scores;
 mod shift;
-#[cfg(feature = "proptest")]
-pub mod strategies;
 
 pub use accumulator::SurfaceAccumulator;
 pub use confidence::{Bounds, Confidence};

@@ -3,10 +3,8 @@
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
 use stretch_core::Degree;
-use stretch_fit::{
-    Factor, Fit, SurfaceAccumulator,
-    strategies::{degrees, observations},
-};
+use stretch_fit::{Factor, Fit, SurfaceAccumulator};
+use stretch_strategies::{degree, observations};
 use testkit::tolerance as tol;
 
 type Sample = stretch_fit::Sample<f64>;
@@ -70,7 +68,7 @@ proptest! {
     /// Tests poly00 to poly55, with conditions of 1 to 1e5.
     #[test]
     fn surfaces_of_every_degree(
-        log in degrees().prop_flat_map(|degree| observations(degree, 0.5, 60..300)),
+        log in degree().prop_flat_map(|degree| observations(degree, 0.5, 60..300)),
     ) {
         let degree = log.surface.degree();
         let fit = folded::<32>(degree, &log.samples).fit().unwrap();

@@ -5,8 +5,8 @@ use proptest::prelude::*;
 use stretch_core::{Degree, Real};
 use stretch_fit::{
     Factor, FitError, Loss, OrderTable, SurfaceAccumulator, cross_validate, held_out, robust_fit,
-    strategies::{degrees, observations, surfaces},
 };
+use stretch_strategies::{degree, observations, surface_of};
 use testkit::tolerance as tol;
 
 type Sample = stretch_fit::Sample<f64>;
@@ -40,7 +40,7 @@ proptest! {
 
     #[test]
     fn a_surface_of_any_degree_is_recovered(
-        log in degrees().prop_flat_map(|degree| observations(degree, 0.0, 120..300))
+        log in degree().prop_flat_map(|degree| observations(degree, 0.0, 120..300))
     ) {
         let degree = log.surface.degree();
         let fit = accumulate::<32>(degree, &log.samples).fit().unwrap();
@@ -212,7 +212,7 @@ proptest! {
     #[test]
     fn the_triangle_knows_the_error_of_any_surface(
         log in observations(Degree::POLY13, 0.5, 30..150),
-        other in surfaces(Degree::POLY13),
+        other in surface_of(Degree::POLY13),
     ) {
         let factor = accumulate::<16>(Degree::POLY13, &log.samples).factor();
         let sum: f64 = log
@@ -278,7 +278,7 @@ proptest! {
         samples in prop::collection::vec(
             (any::<f64>(), any::<f64>(), any::<f64>(), any::<f64>()), 0..60),
         exponent in -320..320_i32,
-        degree in degrees(),
+        degree in degree(),
     ) {
         finite_or_refused::<f64>(degree, &samples, 10.0_f64.powi(exponent))?;
         // f32 gets the same numbers, most of which are out of its range, and a smaller span of

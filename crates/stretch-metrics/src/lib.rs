@@ -10,8 +10,6 @@ mod error_stats;
 pub mod fisher_f;
 mod lag;
 mod paired;
-#[cfg(feature = "proptest")]
-pub mod strategies;
 pub mod student_t;
 mod sum;
 

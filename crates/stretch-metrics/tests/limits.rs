@@ -1,7 +1,9 @@
 //! Tests of long streams, short streams, and inputs for which a metric is undefined.
 
 use approx::relative_eq;
-use stretch_metrics::{Agreement, Delta, ErrorStats, MetricsError, Pair, PairedBlocks, PairedT, lag};
+use stretch_metrics::{
+    Agreement, Delta, ErrorStats, MetricsError, Pair, PairedBlocks, PairedT, lag,
+};
 use testkit::tolerance;
 
 #[test]

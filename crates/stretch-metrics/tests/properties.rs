@@ -4,7 +4,7 @@ use approx::{assert_abs_diff_eq, relative_eq};
 use proptest::prelude::*;
 use stretch_core::Interval;
 use stretch_metrics::{
-    Agreement, Delta, Pair, PairedBlocks, PairedT, lag, strategies, student_t::ln_two_tailed,
+    Agreement, Delta, Pair, PairedBlocks, PairedT, lag, student_t::ln_two_tailed,
 };
 use testkit::tolerance;
 
@@ -46,9 +46,9 @@ fn same(a: &[Option<f64>], b: &[Option<f64>], within: f64) -> Result<(), TestCas
 proptest! {
     #[test]
     fn merge_is_concatenation_in_any_order(
-        a in strategies::pairs(0..60),
-        b in strategies::pairs(0..60),
-        c in strategies::pairs(0..60),
+        a in stretch_strategies::pairs(0..60),
+        b in stretch_strategies::pairs(0..60),
+        c in stretch_strategies::pairs(0..60),
     ) {
         let whole = figures(&agreement(&[a.clone(), b.clone(), c.clone()].concat()));
         let [a, b, c] = [a, b, c].map(|pairs| agreement(&pairs));
@@ -60,7 +60,7 @@ proptest! {
     }
 
     #[test]
-    fn magnitudes_are_ordered(pairs in strategies::pairs(1..200)) {
+    fn magnitudes_are_ordered(pairs in stretch_strategies::pairs(1..200)) {
         let all = agreement(&pairs);
         let e = all.errors();
         let [bias, mae, rmse, max] =
@@ -76,7 +76,7 @@ proptest! {
 
     #[test]
     fn scale_and_shift(
-        pairs in strategies::pairs(2..100),
+        pairs in stretch_strategies::pairs(2..100),
         scale in 0.01..100.0,
         shift in -1e3..1e3,
     ) {
@@ -98,7 +98,7 @@ proptest! {
     }
 
     #[test]
-    fn nothing_that_is_not_finite_comes_out(pairs in strategies::faulty_pairs(0..40)) {
+    fn nothing_that_is_not_finite_comes_out(pairs in stretch_strategies::faulty_pairs(0..40)) {
         let all = agreement(&pairs);
         prop_assert_eq!(all.count() + all.skipped(), pairs.len() as u64);
         for figure in figures(&all).into_iter().flatten() {
@@ -118,7 +118,7 @@ proptest! {
     }
 
     #[test]
-    fn a_lag_is_found_and_is_antisymmetric((expected, truth, estimate) in strategies::lagged(400)) {
+    fn a_lag_is_found_and_is_antisymmetric((expected, truth, estimate) in stretch_strategies::lagged(400)) {
         let found = lag(&truth, &estimate, 12)?;
         assert_abs_diff_eq!(found.samples, expected, epsilon = tolerance::METRICS_LAG_PARABOLA);
         prop_assert!(found.correlation >= found.correlation_at_zero && !found.at_limit);
@@ -127,7 +127,7 @@ proptest! {
     }
 
     #[test]
-    fn swapping_the_pairs_turns_the_test_round(pairs in strategies::pairs(3..80)) {
+    fn swapping_the_pairs_turns_the_test_round(pairs in stretch_strategies::pairs(3..80)) {
         let (mut one, mut other) = (PairedT::new(), PairedT::new());
         for &(a, b) in &pairs {
             one.push(a - b);

@@ -19,8 +19,6 @@ mod observer;
 mod one;
 mod reading;
 mod receptor;
-#[cfg(feature = "proptest")]
-pub mod strategies;
 
 pub use defects::{Defects, DefectsMemory};
 pub use diagnosed::DiagnosedReceptor;

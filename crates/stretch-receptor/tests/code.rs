@@ -3,7 +3,7 @@
 use approx::abs_diff_eq;
 use proptest::{collection::vec, prelude::*};
 use stretch_core::{
-    Branch, Calibration, Model, Polarity, RateEstimator, Runner, Stage, Target, Volts, strategies,
+    Branch, Calibration, Model, Polarity, RateEstimator, Runner, Stage, Target, Volts,
 };
 use stretch_filter::SgRate;
 use stretch_receptor::{
@@ -146,8 +146,8 @@ fn every_code_at_every_rate_is_within_a_hundredth_of_a_percent() {
 
 /// Calibrations, linear or poly13, whose rate estimator is the eleven-point parabola.
 fn calibration() -> impl Strategy<Value = Calibration> {
-    let surface = || strategies::surface_of(stretch_core::Degree::POLY13);
-    (strategies::paper_calibration(), surface(), surface(), 60.0..400.0).prop_map(
+    let surface = || stretch_strategies::surface_of(stretch_core::Degree::POLY13);
+    (stretch_strategies::paper_calibration(), surface(), surface(), 60.0..400.0).prop_map(
         |(calibration, up, down, rest_length)| {
             let mut spec = calibration.into_spec();
             spec.rate_estimator = RateEstimator::SAVGOL_11_2;

@@ -236,8 +236,8 @@ proptest! {
     /// fitted targets and 2 % more.
     #[test]
     fn no_stream_makes_it_leave_its_domain(
-        calibration in stretch_core::strategies::diagnosed_calibration(),
-        stream in stretch_receptor::strategies::faulty_stream(150),
+        calibration in stretch_strategies::diagnosed_calibration(),
+        stream in stretch_strategies::faulty_voltages(150),
         pressure in proptest::num::f64::ANY,
     ) {
         let Model::Diagnosed(map) = &calibration.spec().model else { unreachable!() };

@@ -2,7 +2,7 @@
 
 use proptest::{collection::vec, prelude::*, sample::Index};
 use serde_json::{Value, json};
-use stretch_core::{Calibration, Real, Runner, Volts, strategies};
+use stretch_core::{Calibration, Real, Runner, Volts};
 use stretch_receptor::Receptor;
 
 /// Numbers of all magnitudes that a float can have, and the bounds of the checks.
@@ -33,7 +33,7 @@ fn numbers(value: &Value, path: String, found: &mut Vec<String>) {
 fn spoilt() -> impl Strategy<Value = Option<Calibration>> {
     // a number is scaled or replaced, or all signals are scaled at once, as by a change of units
     let change = (any::<Index>(), number(), any::<bool>());
-    (strategies::calibration(), vec(change, 0..5), prop::option::of(-9i32..9)).prop_map(
+    (stretch_strategies::calibration(), vec(change, 0..5), prop::option::of(-9i32..9)).prop_map(
         |(calibration, changes, units)| {
             let mut record = serde_json::to_value(calibration).unwrap();
             let mut paths = Vec::new();

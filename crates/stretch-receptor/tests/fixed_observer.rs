@@ -6,7 +6,7 @@ use stretch_core::{Calibration, Runner, Stage, Volts};
 use stretch_receptor::{
     Domain, ObserverReceptor, Withheld,
     code::{Adc, AdcCode, AdcSpec, FixedObserver},
-    example_calibration, example_observer, strategies,
+    example_calibration, example_observer,
 };
 
 fn adc() -> Adc {
@@ -38,7 +38,7 @@ fn both(
 #[test]
 fn integers_answer_as_floats_do() {
     let mut runner = TestRunner::deterministic();
-    let any = (stretch_core::strategies::observer_calibration(), strategies::clean_stream(300));
+    let any = (stretch_strategies::observer_calibration(), stretch_strategies::clean_voltages(300));
     let mut parted = Vec::new();
     for case in 0..256 {
         let (calibration, stream) = any.new_tree(&mut runner).expect("a calibration").current();
@@ -63,7 +63,7 @@ proptest! {
 
     #[test]
     fn no_code_overflows_a_step(
-        calibration in stretch_core::strategies::observer_calibration(),
+        calibration in stretch_strategies::observer_calibration(),
         codes in proptest::collection::vec(prop_oneof![
             8 => 0..4096i32,
             1 => any::<i32>(),
@@ -88,7 +88,7 @@ proptest! {
     }
 
     #[test]
-    fn records_keep_every_bit(calibration in stretch_core::strategies::observer_calibration()) {
+    fn records_keep_every_bit(calibration in stretch_strategies::observer_calibration()) {
         let fixed = FixedObserver::new(&calibration, &adc()).unwrap();
         let mut buffer = [0; 1024];
         let bytes = postcard::to_slice(&fixed, &mut buffer).unwrap();

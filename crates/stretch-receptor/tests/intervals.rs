@@ -9,7 +9,7 @@
 use std::ops::{Add, Mul, Shr, Sub};
 
 use proptest::{collection::vec, prelude::*};
-use stretch_core::{Calibration, Runner, strategies};
+use stretch_core::{Calibration, Runner};
 use stretch_receptor::{
     code::{
         Adc, AdcCode, AdcSpec, CodeMap, CodeSurface, FixedCalibration, FixedNumbers, FixedObserver,
@@ -337,7 +337,7 @@ proptest! {
 
     #[test]
     fn every_record_of_a_line_or_surfaces_is_proved(
-        calibration in strategies::paper_calibration(), bits in 8u8..=16,
+        calibration in stretch_strategies::paper_calibration(), bits in 8u8..=16,
         codes in vec(any::<u16>(), 12..80),
     ) {
         let made = FixedCalibration::<11, 2>::new(&calibration, &adc(bits, &calibration));
@@ -380,7 +380,7 @@ proptest! {
 
     #[test]
     fn every_observer_is_proved(
-        calibration in strategies::observer_calibration(), bits in 8u8..=16,
+        calibration in stretch_strategies::observer_calibration(), bits in 8u8..=16,
         codes in vec(any::<u16>(), 1..120),
     ) {
         let Ok(fixed) = FixedObserver::new(&calibration, &adc(bits, &calibration)) else {

@@ -10,7 +10,7 @@ use stretch_core::{
 use stretch_receptor::{
     HistoryReceptor, ObserverReceptor, Receptor, ReceptorError, StretchReceptor, Withheld,
     code::{Adc, AdcSpec, FixedCalibration, FixedObserver},
-    example_calibration, example_diagnosed, strategies,
+    example_calibration, example_diagnosed,
 };
 
 const FIT: FitSummary = FitSummary { samples: 9000, r_squared: 0.99, rmse: 0.01 };
@@ -124,7 +124,7 @@ proptest! {
     #[test]
     fn readings_are_finite_whatever_comes(
         calibration in remembering(),
-        stream in strategies::faulty_stream(200),
+        stream in stretch_strategies::faulty_voltages(200),
     ) {
         let mut wide = Runner::new(Receptor::<f64>::new(&calibration).unwrap());
         let mut narrow = Runner::new(Receptor::<f32>::new(&calibration).unwrap());
@@ -148,8 +148,8 @@ proptest! {
     /// because nothing of a stream stays in the design.
     #[test]
     fn any_calibration_on_any_stream(
-        calibration in stretch_core::strategies::calibration(),
-        stream in strategies::faulty_stream(120),
+        calibration in stretch_strategies::calibration(),
+        stream in stretch_strategies::faulty_voltages(120),
     ) {
         let mut wide = Runner::new(Receptor::<f64>::new(&calibration).unwrap());
         let mut narrow = Runner::new(Receptor::<f32>::new(&calibration).unwrap());
@@ -171,7 +171,7 @@ proptest! {
     }
 
     #[test]
-    fn both_precisions_agree(calibration in remembering(), stream in strategies::clean_stream(300)) {
+    fn both_precisions_agree(calibration in remembering(), stream in stretch_strategies::clean_voltages(300)) {
         let mut wide = Runner::new(Receptor::<f64>::new(&calibration).unwrap());
         let mut narrow = Runner::new(Receptor::<f32>::new(&calibration).unwrap());
         for &volts in &stream {

@@ -7,9 +7,7 @@ use proptest::{
     strategy::{Strategy, ValueTree},
     test_runner::TestRunner,
 };
-use stretch_core::{
-    Calibration, Design, Model, Real, RestTracker, Runner, Stage, Volts, strategies,
-};
+use stretch_core::{Calibration, Design, Model, Real, RestTracker, Runner, Stage, Volts};
 use stretch_receptor::{
     Reading, Receptor, Withheld,
     code::{Adc, AdcCode, AdcSpec, CodeReading, FixedCalibration, FixedObserver, FixedReceptor},
@@ -143,10 +141,10 @@ fn records() -> Vec<(String, Calibration)> {
             let record = tree.new_tree(&mut runner).expect("a record").current();
             (format!("{name} {n}"), record)
         };
-        all.push(draw("surfaces or line", strategies::paper_calibration().boxed()));
-        all.push(draw("history", strategies::history_calibration().boxed()));
-        all.push(draw("observer", strategies::observer_calibration().boxed()));
-        all.push(draw("diagnosed", strategies::diagnosed_calibration().boxed()));
+        all.push(draw("surfaces or line", stretch_strategies::paper_calibration().boxed()));
+        all.push(draw("history", stretch_strategies::history_calibration().boxed()));
+        all.push(draw("observer", stretch_strategies::observer_calibration().boxed()));
+        all.push(draw("diagnosed", stretch_strategies::diagnosed_calibration().boxed()));
     }
     all
 }

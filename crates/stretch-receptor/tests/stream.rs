@@ -4,12 +4,12 @@ use approx::{abs_diff_eq, assert_abs_diff_eq};
 use proptest::prelude::*;
 use stretch_core::{
     Branch, Calibration, Degree, Design, Model, Polarity, RateEstimator, Runner, SampleRate, Stage,
-    Surface, Volts, strategies::paper_calibration,
+    Surface, Volts,
 };
 use stretch_filter::{IntegerSgRate, RateFilter, SgRate};
 use stretch_receptor::{
     Domain, MAX_BRIDGED, Reading, Receptor, ReceptorError, StretchReceptor, Withheld,
-    example_calibration, strategies,
+    example_calibration,
 };
 use testkit::tolerance;
 
@@ -47,7 +47,7 @@ fn by_hand(calibration: &Calibration, branch: Branch, rate: f64, volts: f64) -> 
 proptest! {
     #[test]
     fn folded_equals_the_paper_written_out(
-        calibration in paper_calibration(), stream in strategies::clean_stream(80),
+        calibration in stretch_strategies::paper_calibration(), stream in stretch_strategies::clean_voltages(80),
     ) {
         let receptor = StretchReceptor::<f64>::new(&calibration).unwrap();
         let rates = RateFilter::<f64>::new(calibration.spec().rate_estimator, calibration.spec().sample_rate_hz).unwrap();
@@ -76,7 +76,7 @@ proptest! {
 
     #[test]
     fn any_stream_gives_finite_readings(
-        calibration in paper_calibration(), stream in strategies::faulty_stream(200),
+        calibration in stretch_strategies::paper_calibration(), stream in stretch_strategies::faulty_voltages(200),
     ) {
         let mut wide = Runner::new(StretchReceptor::<f64>::new(&calibration).unwrap());
         let mut narrow = Runner::new(StretchReceptor::<f32>::new(&calibration).unwrap());
@@ -91,7 +91,7 @@ proptest! {
     }
 
     #[test]
-    fn a_fixed_shape_gives_the_same_bits(stream in strategies::faulty_stream(120)) {
+    fn a_fixed_shape_gives_the_same_bits(stream in stretch_strategies::faulty_voltages(120)) {
         let calibration = example_calibration();
         let rate = SgRate::<f64, 11, 2>::new(SampleRate::new(100.0).unwrap()).unwrap();
         let mut fixed = Runner::new(StretchReceptor::with_rate(&calibration, rate).unwrap());
@@ -102,7 +102,7 @@ proptest! {
     }
 
     #[test]
-    fn a_mirrored_signal_gives_the_same_estimate(stream in strategies::clean_stream(120)) {
+    fn a_mirrored_signal_gives_the_same_estimate(stream in stretch_strategies::clean_voltages(120)) {
         // mirror the signal about its offset and flip every odd power: the same physics,
         // with a gauge that falls as the muscle contracts
         let rising = example_calibration();

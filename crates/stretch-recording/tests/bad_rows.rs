@@ -1,7 +1,7 @@
 //! Rows that cannot be read are left out and counted, in files and in live streams. Too many of them are refused.
 
 use proptest::prelude::*;
-use stretch_data::{Trial, strategies};
+use stretch_data::Trial;
 use stretch_recording::{ReadOptions, Recording, RowReader};
 
 fn asked() -> ReadOptions {
@@ -238,7 +238,7 @@ fn a_lost_sample_takes_time() {
 proptest! {
     #[test]
     fn a_recording_with_one_damaged_row_reads_as_its_other_rows(
-        trial in strategies::rig_trial(20..60),
+        trial in stretch_strategies::rig_trial(20..60),
         at in any::<prop::sample::Index>(),
         way in prop::sample::select(HARMS.map(|(way, _)| way).to_vec()),
     ) {

@@ -1,7 +1,7 @@
 //! A table that is written in any dialect is read back unchanged, as a whole or row by row.
 
 use proptest::prelude::*;
-use stretch_data::{Trial, push_number, strategies};
+use stretch_data::{Trial, push_number};
 use stretch_recording::{ReadOptions, Recording, RowReader};
 
 /// A way to write a table.
@@ -89,7 +89,7 @@ impl Dialect {
 
 proptest! {
     #[test]
-    fn a_table_in_any_dialect(trial in strategies::rig_trial(2..40), dialect in dialect()) {
+    fn a_table_in_any_dialect(trial in stretch_strategies::rig_trial(2..40), dialect in dialect()) {
         let text = dialect.write(&trial);
         // A name with its unit in capitals is required as it is written.
         let capital = dialect.units == Units::InNames;
@@ -112,7 +112,7 @@ proptest! {
     }
 
     #[test]
-    fn without_a_header(trial in strategies::rig_trial(2..40), dialect in dialect(), cut in 0..12_usize) {
+    fn without_a_header(trial in stretch_strategies::rig_trial(2..40), dialect in dialect(), cut in 0..12_usize) {
         let header = Dialect { comments: "", units: Units::InNames, is_trailed: false, has_mark: false, ..dialect };
         let text = header.write(&trial);
         let (_, rows) = text.split_once('\n').expect("a header");
@@ -134,7 +134,7 @@ proptest! {
     }
 
     #[test]
-    fn soup_never_panics_and_what_is_read_can_be_written(text in strategies::faulty_csv()) {
+    fn soup_never_panics_and_what_is_read_can_be_written(text in stretch_strategies::faulty_csv()) {
         let named = ReadOptions::new().columns(["time_s", "v"]);
         for options in [ReadOptions::new(), ReadOptions::new().grid_hz(10.0), named] {
             match Recording::from_reader(&text[..], "soup", &options) {
@@ -150,7 +150,7 @@ proptest! {
     }
 
     #[test]
-    fn own_form_is_read_without_a_word(trial in strategies::rig_trial(1..60)) {
+    fn own_form_is_read_without_a_word(trial in stretch_strategies::rig_trial(1..60)) {
         let mut text = Vec::new();
         trial.write_to(&mut text)?;
         let read = Recording::from_reader(&text[..], "rig.csv", &ReadOptions::new())?;

@@ -1,7 +1,7 @@
 //! Written recordings are read back bit by bit, and no input causes a panic.
 
 use proptest::prelude::*;
-use stretch_data::{Trial, strategies};
+use stretch_data::Trial;
 use stretch_recording::{ReadOptions, Recording, RowReader};
 
 fn bits(values: &[f64]) -> Vec<u64> {
@@ -19,7 +19,7 @@ fn as_recorded(mut trial: Trial) -> Trial {
 
 proptest! {
     #[test]
-    fn trials(trial in prop_oneof![strategies::any_trial(), strategies::rig_trial(1..50)]) {
+    fn trials(trial in prop_oneof![stretch_strategies::any_trial(), stretch_strategies::rig_trial(1..50)]) {
         let trial = as_recorded(trial);
         let mut text = Vec::new();
         trial.write_to(&mut text)?;
@@ -44,7 +44,7 @@ proptest! {
 
     #[test]
     fn columns_in_any_order_and_dialect(
-        trial in strategies::rig_trial(1..30),
+        trial in stretch_strategies::rig_trial(1..30),
         turned in any::<bool>(),
         dialect in prop::sample::select(vec![(",", "\n", ""), (";", "\r\n", "\u{feff}"), ("\t", "\n\n", "")]),
     ) {
@@ -64,7 +64,7 @@ proptest! {
     }
 
     #[test]
-    fn soup_never_panics_and_what_is_read_is_sound(soup in strategies::faulty_csv()) {
+    fn soup_never_panics_and_what_is_read_is_sound(soup in stretch_strategies::faulty_csv()) {
         let options = ReadOptions::new().max_line_bytes(64);
         if let Ok(Recording { trial, .. }) = Recording::from_reader(&soup[..], "soup", &options) {
             trial.check()?;

@@ -5,7 +5,7 @@ use std::fs;
 use proptest::{prelude::*, strategy::ValueTree, test_runner::TestRunner};
 use serde_json::{Value, json};
 use stretch_calibrate::{calibration_from_json, calibration_to_json, read_calibration};
-use stretch_core::{record, strategies};
+use stretch_core::record;
 use stretch_receptor::example_calibration;
 use stretch_sleeve::{
     GaugeCalibration, SleeveCalibration, Turns, array_bytes, describe_record, example_array,
@@ -101,7 +101,7 @@ fn turns_stand_beside_a_calibration_in_text_and_are_checked() {
 proptest! {
     #[test]
     fn a_record_in_bytes_begins_with_that_of_its_calibration(
-        calibration in strategies::calibration(), turns in turns(),
+        calibration in stretch_strategies::calibration(), turns in turns(),
     ) {
         let gauge = GaugeCalibration::new(calibration.clone(), Some(turns)).unwrap();
         let mut buffers = [[0; 4096]; 2];

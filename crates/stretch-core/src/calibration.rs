@@ -220,11 +220,7 @@ impl Calibration {
     pub fn new(mut spec: CalibrationSpec) -> Result<Self, DesignError> {
         // changed in place, because a copy would cost two kilobytes of code on a microcontroller
         spec.schema = Schema::CURRENT;
-        if let Target::Contraction { rest_length } = spec.target {
-            DesignError::check("target.rest_length", rest_length, rest_length > 0.0)?;
-        }
         spec.rate_estimator.validate()?;
-        DesignError::check("dead_band", spec.dead_band, spec.dead_band >= 0.0)?;
         spec.model.validate()?;
         check_sizes(&spec)?;
         Ok(Self(spec))

@@ -5,7 +5,7 @@
 
 use crate::{
     DesignError, FitSummary, Interval, MAX_KNOTS, RestTracker, Values,
-    sizes::{MOST, apart, extent, size},
+    sizes::{curve, domain, extent, not_negative, size},
 };
 
 /// Strain that a pressure p adds to the gauge: the drive u becomes `u + c x (1 + bend (1 - x))`, with `x = p/scale`.
@@ -157,30 +157,10 @@ impl DiagnosedMap {
             rest.validate()?;
         }
         self.check_defects()?;
-        let knots = self.curve.len();
-        DesignError::check("length of diagnosed.curve", knots as f64, knots >= 2)?;
-        let rises = self.curve[knots - 1] > self.curve[0];
-        for pair in self.curve.windows(2) {
-            let step = pair[1] - pair[0];
-            let is_on = step != 0.0 && (step > 0.0) == rises;
-            DesignError::check("step of diagnosed.curve", step, is_on)?;
-            apart("step of diagnosed.curve", pair)?;
-        }
-        for &signal in self.curve.iter() {
-            size("diagnosed.curve", signal)?;
-        }
-        let drive = self.drive_domain.validate("diagnosed.drive_domain")?;
-        let estimate = self.estimate_domain.validate("diagnosed.estimate_domain")?;
-        for (field, range) in
-            [("diagnosed.drive_domain", drive), ("diagnosed.estimate_domain", estimate)]
-        {
-            if range.min >= range.max {
-                return Err(DesignError::EmptyRange { field, min: range.min, max: range.max });
-            }
-            size(field, range.min)?;
-            size(field, range.max)?;
-            extent(field, range.max - range.min)?;
-        }
+        let fields = ["length of diagnosed.curve", "step of diagnosed.curve", "diagnosed.curve"];
+        curve(fields, &self.curve)?;
+        domain("diagnosed.drive_domain", self.drive_domain)?;
+        domain("diagnosed.estimate_domain", self.estimate_domain)?;
         let skew = self.skew_s;
         DesignError::check("diagnosed.skew_s", skew, skew.abs() <= Self::MOST_SKEW_S)?;
         for state in self.initial_hysteresis {
@@ -198,52 +178,39 @@ impl DiagnosedMap {
     }
 
     fn check_defects(&self) -> Result<(), DesignError> {
-        let positive = extent;
         if let Some(Crosstalk { c, bend, scale }) = self.crosstalk {
             size("diagnosed.crosstalk.c", c)?;
             DesignError::check("diagnosed.crosstalk.bend", bend, bend.abs() <= 1.0)?;
-            positive("diagnosed.crosstalk.scale", scale)?;
+            extent("diagnosed.crosstalk.scale", scale)?;
         }
         let knees = [self.slack_low, self.slack_high, self.floor, self.ceiling];
         for Knee { at, width } in knees.into_iter().flatten() {
             size("diagnosed knee's at", at)?;
-            positive("diagnosed knee's width", width)?;
+            extent("diagnosed knee's width", width)?;
         }
         for Plays { share, radii } in [self.slip, self.hysteresis].into_iter().flatten() {
             // With a share above 1 the drive could fall while the target rises, and could not be inverted.
             DesignError::check("diagnosed plays' share", share, (0.0..=1.0).contains(&share))?;
             for radius in radii {
-                DesignError::check(
-                    "diagnosed plays' radii",
-                    radius,
-                    (0.0..=MOST).contains(&radius),
-                )?;
+                not_negative("diagnosed plays' radii", radius)?;
             }
         }
         if let Some(Fading { share, taus_s }) = self.relaxation {
             DesignError::check("diagnosed.relaxation.share", share, share > -1.0)?;
             size("diagnosed.relaxation.share", share)?;
             for tau in taus_s {
-                positive("diagnosed.relaxation.taus_s", tau)?;
+                extent("diagnosed.relaxation.taus_s", tau)?;
             }
         }
         if let Some(Worn { m, n, zero, reversal, travelled }) = self.worn {
             DesignError::check("diagnosed.worn.m", m, (0.0..1.0).contains(&m))?;
-            positive("diagnosed.worn.n", n)?;
+            extent("diagnosed.worn.n", n)?;
             size("diagnosed.worn.zero", zero)?;
-            DesignError::check(
-                "diagnosed.worn.reversal",
-                reversal,
-                (0.0..=MOST).contains(&reversal),
-            )?;
-            DesignError::check(
-                "diagnosed.worn.travelled",
-                travelled,
-                (0.0..=MOST).contains(&travelled),
-            )?;
+            not_negative("diagnosed.worn.reversal", reversal)?;
+            not_negative("diagnosed.worn.travelled", travelled)?;
         }
         for tau in self.lowpass_s.into_iter().flatten() {
-            positive("diagnosed.lowpass_s", tau)?;
+            extent("diagnosed.lowpass_s", tau)?;
         }
         Ok(())
     }

@@ -5,7 +5,7 @@
 
 use crate::{
     DesignError, FitSummary, Interval, RestTracker, Values,
-    sizes::{apart, extent, size},
+    sizes::{curve, domain, extent, size},
 };
 
 /// Largest number of relaxations in an [`ObserverMap`].
@@ -69,33 +69,10 @@ impl ObserverMap {
         if let Some(rest) = &self.rest {
             rest.validate()?;
         }
-        let knots = self.curve.len();
-        DesignError::check("length of observer.curve", knots as f64, knots >= 2)?;
-        let rises = self.curve[knots - 1] > self.curve[0];
-        for pair in self.curve.windows(2) {
-            let step = pair[1] - pair[0];
-            DesignError::check(
-                "step of observer.curve",
-                step,
-                step != 0.0 && (step > 0.0) == rises,
-            )?;
-            apart("step of observer.curve", pair)?;
-        }
-        for &signal in self.curve.iter() {
-            size("observer.curve", signal)?;
-        }
-        let drive = self.drive_domain.validate("observer.drive_domain")?;
-        let estimate = self.estimate_domain.validate("observer.estimate_domain")?;
-        for (field, range) in
-            [("observer.drive_domain", drive), ("observer.estimate_domain", estimate)]
-        {
-            if range.min >= range.max {
-                return Err(DesignError::EmptyRange { field, min: range.min, max: range.max });
-            }
-            size(field, range.min)?;
-            size(field, range.max)?;
-            extent(field, range.max - range.min)?;
-        }
+        let fields = ["length of observer.curve", "step of observer.curve", "observer.curve"];
+        curve(fields, &self.curve)?;
+        domain("observer.drive_domain", self.drive_domain)?;
+        domain("observer.estimate_domain", self.estimate_domain)?;
         for &tau in self.relaxations_s.iter() {
             extent("observer.relaxations_s", tau)?;
         }

@@ -2,7 +2,7 @@
 
 use crate::{
     DesignError,
-    sizes::{MOST, extent, size},
+    sizes::{extent, not_negative, size},
 };
 
 /// Parameters of a baseline that follows the resting signal.
@@ -46,7 +46,7 @@ impl RestTracker {
     pub fn validate(&self) -> Result<(), DesignError> {
         size("rest.level", self.level)?;
         extent("rest.catch_up_s", self.catch_up_s)?;
-        DesignError::check("rest.leak", self.leak, (0.0..=MOST).contains(&self.leak))?;
+        not_negative("rest.leak", self.leak)?;
         Ok(())
     }
 }

@@ -1,13 +1,14 @@
 //! The live form of a gauge's forward model: a small Kalman filter.
 
 use stretch_core::{
-    Baseline, Branch, Calibration, Design, DesignError, MAX_KNOTS, MAX_OBSERVER_PLAYS,
+    Baseline, Branch, Calibration, Design, DesignError, MAX_OBSERVER_PLAYS,
     MAX_OBSERVER_RELAXATIONS, Model, Real, RestLevel,
     arithmetic::{lag, lag_share, play},
 };
 
 use crate::{
     Domain, Front, Reading, ReceptorError,
+    curve::Curve,
     fold::{output, reference_dead_band, rounded},
     front::{Live, over_volts},
     gains::{Gains, SLOPES, STATES},
@@ -39,16 +40,8 @@ pub struct Observer<T> {
     pub sign: T,
     /// The tracker of the baseline (the drifting signal at rest), if the calibration has one.
     pub rest: RestLevel<T>,
-    /// Number of knots of the curve.
-    pub knots: usize,
-    /// Signals at the knots, rising; negated if the signal falls as the target rises.
-    pub curve: [T; MAX_KNOTS],
-    /// The drive of the first knot.
-    pub drive_low: T,
-    /// Difference of the drives of neighbouring knots.
-    pub drive_step: T,
-    /// Reciprocal of `drive_step`.
-    pub per_step: T,
+    /// The curve from drive to signal.
+    pub curve: Curve<T>,
     /// Number of relaxations.
     pub relaxations: usize,
     /// Share of its distance to the target that each relaxation (first-order lag) covers in a sample.
@@ -119,11 +112,7 @@ impl<T: Real> ObserverReceptor<T> {
         let model = Observer {
             sign: T::from_f64(sign),
             rest: RestLevel::new(map.rest, polarity, calibration.spec().signal_range, sample_rate),
-            knots,
-            curve: rounded(map.curve.iter().map(|v| sign * v)),
-            drive_low: T::from_f64(drive.min),
-            drive_step: T::from_f64(step),
-            per_step: T::from_f64(step.recip()),
+            curve: Curve::new(map.curve.iter().map(|v| sign * v), drive),
             relaxations: map.relaxations_s.len(),
             shares: rounded(map.relaxations_s.iter().map(|&tau| lag_share(period_s, tau))),
             amplitudes: rounded(map.amplitudes.iter().copied()),
@@ -149,29 +138,21 @@ impl<T: Real> Observer<T> {
     /// Returns the drive at which the curve has the signal, and the signal clamped to the curve.
     #[inline(always)]
     fn inverse(&self, signal: T) -> (T, T) {
-        let (first, last) = (self.curve[0], self.curve[self.knots - 1]);
+        let (first, last) = self.curve.ends();
         let held = signal.max(first).min(last);
-        // bisection for the last knot at or below the signal
-        let (mut below, mut above) = (0, self.knots - 1);
-        while above - below > 1 {
-            let middle = (below + above) / 2;
-            if self.curve[middle] <= held { below = middle } else { above = middle }
-        }
-        let rise = self.curve[below + 1] - self.curve[below];
-        let place = T::from_f64(below as f64) + (held - self.curve[below]) / rise;
-        (self.drive_low + place * self.drive_step, held)
+        (self.curve.inverse(held).0, held)
     }
 
     /// Returns the signal at a drive, the slope at that drive, and the drive clamped to the fitted curve.
     #[inline(always)]
     fn forward(&self, drive: T) -> (T, T, T) {
-        let most = T::from_f64((self.knots - 1) as f64);
-        let place = ((drive - self.drive_low) * self.per_step).max(T::zero()).min(most);
-        let below = place.to_usize().unwrap_or(0).min(self.knots - 2);
-        let rise = self.curve[below + 1] - self.curve[below];
+        let Curve { knots, values, low, step, per_step } = &self.curve;
+        let most = T::from_f64((knots - 1) as f64);
+        let place = ((drive - *low) * *per_step).max(T::zero()).min(most);
+        let below = place.to_usize().unwrap_or(0).min(knots - 2);
+        let rise = values[below + 1] - values[below];
         let share = place - T::from_f64(below as f64);
-        let held = self.drive_low + place * self.drive_step;
-        (self.curve[below] + share * rise, rise * self.per_step, held)
+        (values[below] + share * rise, rise * *per_step, *low + place * *step)
     }
 
     fn begin(&self, memory: &mut ObserverMemory<T>, signal: T) {
@@ -223,12 +204,12 @@ impl<T: Real> Observer<T> {
         let (to, held) = self.inverse(signal);
         let run = to - from;
         // over a very small distance, the secant would be dominated by rounding
-        let far = run.abs() > T::from_f64(LEAST_RUN) * self.drive_step;
+        let far = run.abs() > T::from_f64(LEAST_RUN) * self.curve.step;
         let secant = if far { (held - predicted) / run } else { tangent };
         let slope = tangent.max(secant);
 
         // a spike is limited to one whole span of the curve beyond its end
-        let (first, last) = (self.curve[0], self.curve[self.knots - 1]);
+        let (first, last) = self.curve.ends();
         let span = last - first;
         let surprise = signal.max(first - span).min(last + span) - predicted;
         let gains = &self.gains[self.nearest(slope)];

@@ -84,14 +84,14 @@ pub(crate) fn observer_float(calibration: &Calibration) -> Result<Part, ExportEr
     constants
         .define("SIGN", o.sign, "-1 if the signal falls as the target rises")
         .define("PERIOD_S", o.period_s, "from a sample to the next")
-        .define("KNOTS", o.knots as i32, "knots of the curve from drive to signal")
-        .array("float", "curve", &o.curve[..o.knots])
-        .define("DRIVE_LOW", o.drive_low, "the drive of the first knot")
-        .define("DRIVE_STEP", o.drive_step, "distance of knots")
-        .define("PER_STEP", o.per_step, "1 / DRIVE_STEP")
+        .define("KNOTS", o.curve.knots as i32, "knots of the curve from drive to signal")
+        .array("float", "curve", &o.curve.values[..o.curve.knots])
+        .define("DRIVE_LOW", o.curve.low, "the drive of the first knot")
+        .define("DRIVE_STEP", o.curve.step, "distance of knots")
+        .define("PER_STEP", o.curve.per_step, "1 / DRIVE_STEP")
         .define(
             "LEAST_RUN",
-            LEAST_RUN * o.drive_step,
+            LEAST_RUN * o.curve.step,
             "smallest change of the drive for which a secant is computed",
         );
     constants.define("LEAD_S", o.lead_s, "seconds by which the signal leads");

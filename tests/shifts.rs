@@ -2,7 +2,7 @@
 //! with an offset of 8 mm.
 
 use stretch_calibrate::{Options, calibrate};
-use stretch_core::Degree;
+use stretch_core::{Degree, Seconds};
 use stretch_data::{Channel, Trial};
 use stretch_fit::{Sample, SurfaceAccumulator};
 use stretch_sim::{Key, Rig, RunSettings, Session, TrialPlan};
@@ -181,7 +181,7 @@ fn one_gauge_alarms_seldom_and_tells_8_mm() {
             let moved_v = 8.0 * volts_per_mm(&trial, 0);
             for (i, &volts) in trial.channels[1].values.iter().enumerate() {
                 let time_s = 60.0 * f64::from(minute) + 0.01 * i as f64;
-                let _ = live.step(time_s, volts + moved_v);
+                let _ = live.step(Seconds(time_s), volts + moved_v);
                 if let Some(zero) = live.zero() {
                     told = told.or(zero.has_shifted.then_some(time_s));
                     errors.push((zero.off_reference - 8.0).abs());

@@ -5,7 +5,7 @@ use pyo3::{
     types::{IntoPyDict, PyDict},
 };
 use stretch_calibrate::{Faults, LiveReceptor};
-use stretch_core::Target;
+use stretch_core::{Seconds, Target};
 
 /// Estimate for one sample, as returned by `Receptor.step`.
 #[pyclass(frozen, module = "stretch_gap", get_all)]
@@ -81,7 +81,7 @@ impl Receptor {
     /// >>> readings = [receptor.step(time_s, volt) for time_s, volt in zip(time_s[:100], gauge_v)]
     /// >>> assert abs(readings[-1].estimate - angle_deg[99]) < 1.0
     fn step(&mut self, time_s: f64, signal: f64) -> Option<Reading> {
-        let reading = self.live.step(time_s, signal).ok()?;
+        let reading = self.live.step(Seconds(time_s), signal).ok()?;
         Some(Reading {
             estimate: reading.estimate,
             rate: reading.rate,

@@ -6,6 +6,7 @@ use std::{
 };
 
 use stretch_calibrate::{Doubt, Faults, Seen, estimates_header, pressure_column, push_estimate};
+use stretch_core::Seconds;
 use stretch_data::files::{is_standard_output, write_whole};
 use stretch_data::{Trial, unit};
 use stretch_recording::{ReadOptions, Recording, RowReader};
@@ -190,7 +191,7 @@ fn live(
                 if let Some(pressure) = row.values.get(1) {
                     receptor.set_pressure(*pressure);
                 }
-                let reading = receptor.step(row.time_s, row.values[0]);
+                let reading = receptor.step(Seconds(row.time_s), row.values[0]);
                 let warning = seen.take(row.time_s, row.values[0], &reading);
                 if let Some(zero) = receptor.zero() {
                     zero_watch.take_unless(

@@ -195,7 +195,7 @@ fn rows_that_go_back_in_time_do_not_lower_the_rate_of_a_stream() {
         let mut live = LiveReceptor::new(&calibration).expect("a receptor");
         let doubt = (0..200).find_map(|n| {
             let time_s = periods(n) / 400.0;
-            seen.take(time_s, 1.5, &live.step(time_s, 1.5))
+            seen.take(time_s, 1.5, &live.step(stretch_core::Seconds(time_s), 1.5))
         });
         let text = doubt.expect(name).text;
         let found = text.split(' ').nth(3).expect(name);

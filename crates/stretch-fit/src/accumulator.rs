@@ -187,16 +187,18 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     ///
     /// ```
     /// use stretch_core::Degree;
-    /// use stretch_fit::{FitError, SurfaceAccumulator};
+    /// use stretch_fit::{FitError, Sample, SurfaceAccumulator};
     ///
     /// let mut line = SurfaceAccumulator::<f64>::new(Degree::LINE);
-    /// line.push_columns(&[0.0; 3], &[0.0, 1.0, 2.0], &[1.0, 3.0, 5.0])?;
+    /// line.push_columns(Sample { rate: &[0.0; 3], volts: &[0.0, 1.0, 2.0], value: &[1.0, 3.0, 5.0] })?;
     /// approx::assert_abs_diff_eq!(line.fit()?.coefficients()[1], 2.0, epsilon = 1e-12);
-    /// assert!(line.push_columns(&[0.0; 2], &[0.0; 2], &[1.0, f64::NAN]).is_err());
+    /// let refused = Sample { rate: &[0.0; 2][..], volts: &[0.0; 2], value: &[1.0, f64::NAN] };
+    /// assert!(line.push_columns(refused).is_err());
     /// assert_eq!(line.samples(), 3);
     /// # Ok::<(), FitError>(())
     /// ```
-    pub fn push_columns(&mut self, rates: &[T], volts: &[T], values: &[T]) -> Result<(), FitError> {
+    pub fn push_columns(&mut self, columns: Sample<&[T]>) -> Result<(), FitError> {
+        let Sample { rate: rates, volts, value: values } = columns;
         let rows = rates.iter().zip(volts).zip(values);
         let samples =
             || rows.clone().map(|((&rate, &volts), &value)| Sample { rate, volts, value });

@@ -58,12 +58,14 @@ proptest! {
         let (before, after) = log.samples.split_at((cut * log.samples.len() as f64) as usize);
         for part in [before, after] {
             let column = |of: fn(&Sample) -> f64| part.iter().map(of).collect::<Vec<f64>>();
-            columns.push_columns(&column(|s| s.rate), &column(|s| s.volts), &column(|s| s.value)).unwrap();
+            let [rate, volts, value] = [column(|s| s.rate), column(|s| s.volts), column(|s| s.value)];
+            columns.push_columns(stretch_fit::Sample { rate: &rate[..], volts: &volts, value: &value }).unwrap();
         }
         let one_by_one = accumulate::<16>(Degree::POLY13, &log.samples);
         prop_assert_eq!(columns.factor(), one_by_one.factor());
         // if one sample is refused, no sample of its columns is added
-        let refused = columns.push_columns(&[1.0, f64::INFINITY], &[0.0; 2], &[0.0; 2]);
+        let infinite = stretch_fit::Sample { rate: &[1.0, f64::INFINITY][..], volts: &[0.0; 2], value: &[0.0; 2] };
+        let refused = columns.push_columns(infinite);
         let is_refused = matches!(refused, Err(FitError::OutOfRange { field: "rate", .. }));
         prop_assert!(is_refused, "{refused:?}");
         prop_assert_eq!(columns.factor(), one_by_one.factor());

@@ -2,7 +2,7 @@
 
 use plotters::prelude::*;
 use stretch_calibrate::{Calibrated, LiveReceptor};
-use stretch_core::Calibration;
+use stretch_core::{Calibration, Seconds};
 
 use super::{
     canvas::Ink,
@@ -37,7 +37,8 @@ impl Answer {
             let t = n as f64 * dt_s;
             // the middle half of the calibrated range
             let signal = low + span * (0.25 + 0.5 * share(t));
-            answer.estimate.push(live.step(t, signal).map_or(f64::NAN, |reading| reading.estimate));
+            let reading = live.step(Seconds(t), signal);
+            answer.estimate.push(reading.map_or(f64::NAN, |reading| reading.estimate));
             answer.time_s.push(t);
             answer.signal.push(signal);
         }

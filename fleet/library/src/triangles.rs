@@ -9,7 +9,7 @@ use datafusion::{
     logical_expr::EmitTo,
 };
 use stretch_core::Degree;
-use stretch_fit::{Factor, FitError, SurfaceAccumulator};
+use stretch_fit::{Factor, FitError, Sample, SurfaceAccumulator};
 
 use crate::{
     about::About,
@@ -178,9 +178,9 @@ impl<const TERMS: usize> Triangles<TERMS> {
             side.span.widen(column, values);
         }
         let folded = |error| exec_datafusion_err!("rows of a fit: {error}");
-        let [rates, signals, references] = rows;
+        let [rate, volts, value] = rows;
         self.block.exchange(side.factor).map_err(folded)?;
-        self.block.push_columns(rates, signals, references).map_err(folded)?;
+        self.block.push_columns(Sample { rate, volts, value }).map_err(folded)?;
         side.factor = self.block.exchange(self.empty).map_err(folded)?;
         Ok(())
     }

@@ -7,7 +7,7 @@ use stretch_calibrate::{
     Doubt, Link, LinkSample, LiveReceptor, Seen, Twin, calibration_from_json, converter_reach,
     parse_adc,
 };
-use stretch_core::{Calibration, Interval};
+use stretch_core::{Calibration, Interval, Seconds};
 use stretch_data::push_number;
 use stretch_receptor::Reading;
 use wasm_bindgen::prelude::*;
@@ -171,7 +171,7 @@ impl Applied {
     }
 
     fn step(&mut self, time_s: f64, signal: f64) -> Option<Reading> {
-        let reading = self.receptor.step(time_s, signal);
+        let reading = self.receptor.step(Seconds(time_s), signal);
         self.pace = self.seen.take(time_s, signal, &reading).or(self.pace.take());
         reading.ok()
     }

@@ -33,15 +33,16 @@ pub const MOST_MISSING: u32 = 20_000;
 ///
 /// ```
 /// use stretch_calibrate::LiveReceptor;
+/// use stretch_core::Seconds;
 /// use stretch_receptor::Withheld;
 /// # let calibration = stretch_receptor::example_calibration();
 /// let mut live = LiveReceptor::new(&calibration)?;
 /// for n in 0..10 {
-///     assert_eq!(live.step(n as f64 * 0.01, 1.5), Err(Withheld::Warming));
+///     assert_eq!(live.step(Seconds(n as f64 * 0.01), 1.5), Err(Withheld::Warming));
 /// }
-/// assert!(live.step(0.10, 1.5).is_ok());
-/// assert!(live.step(0.13, 1.5).is_ok()); // two samples missing: bridged
-/// assert_eq!(live.step(9.0, 1.5), Err(Withheld::Warming)); // a long gap
+/// assert!(live.step(Seconds(0.10), 1.5).is_ok());
+/// assert!(live.step(Seconds(0.13), 1.5).is_ok()); // two samples missing: bridged
+/// assert_eq!(live.step(Seconds(9.0), 1.5), Err(Withheld::Warming)); // a long gap
 /// assert_eq!(live.faults().missing, 2 + 886);
 /// # Ok::<(), stretch_calibrate::CalibrateError>(())
 /// ```
@@ -93,8 +94,8 @@ impl LiveReceptor {
     ///
     /// # Errors
     /// [`Withheld`] if there is no reading for the sample.
-    pub fn step(&mut self, time_s: f64, signal: f64) -> Result<Reading, Withheld> {
-        match self.cadence.step(Seconds(time_s)) {
+    pub fn step(&mut self, time: Seconds, signal: f64) -> Result<Reading, Withheld> {
+        match self.cadence.step(time) {
             Arrival::Gap { missing } => {
                 self.faults.missing += u64::from(missing);
                 for _ in 0..missing.min(MOST_MISSING) {
@@ -184,7 +185,7 @@ pub(crate) fn each_reading(
         if let Some(pressure) = pressure {
             live.set_pressure(pressure[i]);
         }
-        take(live.step(time_s, v));
+        take(live.step(Seconds(time_s), v));
     }
     Ok(live.faults())
 }

@@ -95,12 +95,13 @@ impl fmt::Display for Doubt {
 ///
 /// ```
 /// use stretch_calibrate::{LiveReceptor, Seen};
+/// use stretch_core::Seconds;
 /// let calibration = stretch_receptor::example_calibration();
 /// let (mut seen, mut live) = (Seen::of(&calibration), LiveReceptor::new(&calibration)?);
 /// // a sensor that is not connected, logged twice as fast as the calibration's trials
 /// let doubts = (0..100).filter_map(|n| {
 ///     let time_s = 0.005 * f64::from(n);
-///     seen.take(time_s, 1.5, &live.step(time_s, 1.5))
+///     seen.take(time_s, 1.5, &live.step(Seconds(time_s), 1.5))
 /// });
 /// assert_eq!(doubts.map(|doubt| doubt.code).collect::<Vec<_>>(), ["other_rate"]);
 /// assert_eq!(seen.doubt().map(|doubt| doubt.code), Some("constant_signal"));

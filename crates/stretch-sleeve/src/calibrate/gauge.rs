@@ -61,8 +61,8 @@ impl LiveGauge {
     ///
     /// # Errors
     /// [`Withheld`] if there is no reading for the sample.
-    pub fn step(&mut self, time_s: f64, signal: f64) -> Result<Reading, Withheld> {
-        let arrival = self.cadence.step(Seconds(time_s));
+    pub fn step(&mut self, time: Seconds, signal: f64) -> Result<Reading, Withheld> {
+        let arrival = self.cadence.step(time);
         let mut corrected = signal;
         if let Some((watch, memory)) = &mut self.watch {
             match arrival {
@@ -75,7 +75,7 @@ impl LiveGauge {
             self.zero = watch.step(memory, signal);
             corrected = watch.corrected(memory, signal);
         }
-        self.receptor.step(time_s, corrected)
+        self.receptor.step(time, corrected)
     }
 
     /// Returns the result about the gauge's zero, if a movement ended with the last sample. Returns `None` during a
@@ -134,7 +134,7 @@ pub fn apply_gauge(
         if let Some(pressure) = pressure {
             live.set_pressure(pressure[i]);
         }
-        readings.push(live.step(time_s, value));
+        readings.push(live.step(Seconds(time_s), value));
         zeros.extend(live.zero().map(|zero| (time_s, zero)));
     }
     Ok(AppliedGauge { applied: Applied { readings, faults: live.faults() }, zeros })

@@ -7,7 +7,7 @@ use datafusion::{
         array::{ArrayRef, BinaryBuilder, BooleanArray},
         datatypes::{DataType, Field, FieldRef},
     },
-    common::{Result, cast::as_float64_array},
+    common::{Result, cast::as_float64_array, plan_datafusion_err},
     logical_expr::{
         Accumulator, AggregateUDF, AggregateUDFImpl, EmitTo, GroupsAccumulator, Signature,
         TypeSignature, Volatility,

@@ -9,7 +9,7 @@ use datafusion::{
     logical_expr::EmitTo,
 };
 use stretch_core::Degree;
-use stretch_fit::{Factor, FitError, Sample, SurfaceAccumulator};
+use stretch_fit::{Factor, Sample, SurfaceAccumulator};
 
 use crate::{
     about::About,

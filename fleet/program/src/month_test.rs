@@ -161,7 +161,6 @@ fn change(branches: &[Branch; 2], apart: &DVector<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use stretch_core::Degree;
     use stretch_fit::{Sample, SurfaceAccumulator};
     use stretch_gap::RandomGenerator;
 

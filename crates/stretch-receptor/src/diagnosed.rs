@@ -139,7 +139,6 @@ impl<T: Real> DiagnosedReceptor<T> {
         let Model::Diagnosed(map) = &calibration.spec().model else {
             return Err(calibration.spec().model.instead_of("diagnosed").into());
         };
-        map.validate()?;
         Ok(Self { model: Diagnosed::new(map, calibration)? })
     }
 }

@@ -1,6 +1,8 @@
 //! The stationary gains of a Kalman filter, one set for each of several slopes of the curve.
 
-use stretch_core::{DesignError, MAX_OBSERVER_RELAXATIONS, ObserverMap, arithmetic::lag_share};
+use stretch_core::{
+    DesignError, Interval, MAX_OBSERVER_RELAXATIONS, ObserverMap, arithmetic::lag_share,
+};
 
 /// Number of states: the target, its rate, and the relaxations.
 pub(crate) const STATES: usize = 2 + MAX_OBSERVER_RELAXATIONS;
@@ -25,14 +27,17 @@ pub(crate) struct Gains {
 }
 
 impl Gains {
-    /// Computes the gains of `map` at `period_s`, for a curve whose segments have slopes from `flattest` to `steepest`
-    /// in signal per drive.
-    pub(crate) fn new(
-        map: &ObserverMap,
-        period_s: f64,
-        flattest: f64,
-        steepest: f64,
-    ) -> Result<Self, DesignError> {
+    /// Computes the gains of `map` at `period_s`, for the slopes of its curve times `sign`, in signal per drive.
+    ///
+    /// # Errors
+    /// A curve against the polarity, because it would be inverted in the wrong direction.
+    pub(crate) fn new(map: &ObserverMap, sign: f64, period_s: f64) -> Result<Self, DesignError> {
+        let Interval { min, max } = map.drive_domain;
+        let step = (max - min) / (map.curve.len() - 1) as f64;
+        let slopes = map.curve.windows(2).map(|pair| sign * (pair[1] - pair[0]) / step);
+        let (flattest, steepest) =
+            slopes.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), s| (a.min(s), b.max(s)));
+        DesignError::check("rise of observer.curve", flattest, flattest > 0.0)?;
         let ratio = libm::pow(steepest / flattest, 1.0 / (SLOPES - 1) as f64);
         let mut gains = Self { ends: [0.0; SLOPES - 1], of: [[0.0; STATES]; SLOPES] };
         let mut slope = flattest;

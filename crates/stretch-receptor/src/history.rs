@@ -87,7 +87,6 @@ impl<T: Real, R> HistoryReceptor<T, R> {
         let Model::History(map) = &calibration.spec().model else {
             return Err(calibration.spec().model.instead_of("history").into());
         };
-        map.validate()?;
         let (polarity, sample_rate) =
             (calibration.spec().polarity, calibration.spec().sample_rate_hz);
         let range = calibration.spec().signal_range;

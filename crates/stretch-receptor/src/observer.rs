@@ -1,8 +1,8 @@
 //! The live form of a gauge's forward model: a small Kalman filter.
 
 use stretch_core::{
-    Baseline, Branch, Calibration, Design, DesignError, MAX_OBSERVER_PLAYS,
-    MAX_OBSERVER_RELAXATIONS, Model, Real, RestLevel,
+    Baseline, Branch, Calibration, Design, MAX_OBSERVER_PLAYS, MAX_OBSERVER_RELAXATIONS, Model,
+    Real, RestLevel,
     arithmetic::{lag, lag_share, play},
 };
 
@@ -94,25 +94,15 @@ impl<T: Real> ObserverReceptor<T> {
         let Model::Observer(map) = &calibration.spec().model else {
             return Err(calibration.spec().model.instead_of("observer").into());
         };
-        map.validate()?;
         let (polarity, sample_rate) =
             (calibration.spec().polarity, calibration.spec().sample_rate_hz);
         let (sign, period_s) = (polarity.sign(), sample_rate.period_s());
         let (gain, zero) = output(calibration);
-        let knots = map.curve.len();
-        let drive = map.drive_domain;
-        let step = (drive.max - drive.min) / (knots - 1) as f64;
-        // a curve against the polarity would be inverted in the wrong direction
-        let rises = sign * (map.curve[knots - 1] - map.curve[0]);
-        DesignError::check("rise of observer.curve", rises, rises > 0.0)?;
-        let slopes = map.curve.windows(2).map(|pair| sign * (pair[1] - pair[0]) / step);
-        let (flattest, steepest) =
-            slopes.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), s| (a.min(s), b.max(s)));
-        let gains = Gains::new(map, period_s, flattest, steepest)?;
+        let gains = Gains::new(map, sign, period_s)?;
         let model = Observer {
             sign: T::from_f64(sign),
             rest: RestLevel::new(map.rest, polarity, calibration.spec().signal_range, sample_rate),
-            curve: Curve::new(map.curve.iter().map(|v| sign * v), drive),
+            curve: Curve::new(map.curve.iter().map(|v| sign * v), map.drive_domain),
             relaxations: map.relaxations_s.len(),
             shares: rounded(map.relaxations_s.iter().map(|&tau| lag_share(period_s, tau))),
             amplitudes: rounded(map.amplitudes.iter().copied()),

@@ -130,11 +130,7 @@ impl ObserverNumbers {
         }
         let drive = map.drive_domain;
         let step = (drive.max - drive.min) / (knots - 1) as f64;
-        let slopes = map.curve.windows(2).map(|pair| sign * (pair[1] - pair[0]) / step);
-        let (flattest, steepest) =
-            slopes.fold((f64::INFINITY, 0.0), |(a, b): (f64, f64), s| (a.min(s), b.max(s)));
-        DesignError::check("rise of observer.curve", flattest, flattest > 0.0)?;
-        let gains = Gains::new(map, period_s, flattest, steepest)?;
+        let gains = Gains::new(map, sign, period_s)?;
         // change of the state per unit of integer signal, with the rate per sample instead of per second
         let of = gains.of.map(|mut of| {
             of[1] *= period_s;

@@ -25,13 +25,14 @@ use crate::display::{Output, detail, doubt, warn};
 ///
 /// Writes time_s, the estimate, its rate, the branch and the domain, one line per
 /// sample. While the rate estimator warms up, at the start and after a gap, the numbers
-/// are empty and the column domain is "warming". A row whose signal is empty or nan gives
+/// are empty and the column domain is "warming"; so they are for 0.3 s after a gap of more
+/// than 0.5 s if the model has memory, because it starts again. A row whose signal is empty or nan gives
 /// no line: in a file a note counts such rows, from standard input a message names each.
 /// They and rows that are absent count as missing samples. Inputs outside the calibrated
 /// domain are clamped, and the column domain shows it. The models linear and curve
 /// need no rate: they give estimates from the first sample on, with an empty rate at
-/// first. An observer has no warm-up either, but its estimates settle within about a
-/// second after a start or a long gap. If one of several gauges has no sample, the row is
+/// first. An observer gives estimates from the first sample on as well, but they settle
+/// within about a second. If one of several gauges has no sample, the row is
 /// kept, and the others give the estimate.
 ///
 /// From standard input each line gets its estimate immediately; a malformed line is

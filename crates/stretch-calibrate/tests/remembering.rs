@@ -2,11 +2,12 @@
 
 use approx::assert_relative_eq;
 use stretch_calibrate::{
-    Calibrated, Memory, ModelKind, Options, calibrate, choose_among, choose_model, evaluate,
+    Calibrated, Memory, ModelKind, Options, apply, calibrate, choose_among, choose_model, evaluate,
     judge_model, read_calibration, write_calibration,
 };
 use stretch_core::Model;
 use stretch_data::{Channel, Trial};
+use stretch_receptor::Withheld;
 use testkit::tolerance as tol;
 
 /// A gauge that overshoots by 0.4 with a time constant of 0.25 s, on a muscle that moves by
@@ -166,4 +167,42 @@ fn auto_says_what_ramps_cannot() {
     let choice = choose_model(&ramps, &Options::default()).unwrap();
     assert!(!matches!(choice.model, ModelKind::Remembering { .. }));
     assert!(choice.notes[0].contains("record one minute of arbitrary motion"), "{choice:?}");
+}
+
+/// After a gap of seconds, in which the muscle moved, models with memory start again: they say so, and their next
+/// estimates are within 5 % of the range of 30 mm.
+#[test]
+fn models_with_memory_start_again_after_a_long_gap() {
+    let fitted = [trial("fit", 60.0, irregular(0.0))];
+    for memory in [Memory::Observer, Memory::History] {
+        let options = Options {
+            model: ModelKind::Remembering { kind: memory, rest: false },
+            ..Options::default()
+        };
+        let calibration = calibrate(&fitted, &options).expect("a fit").calibration;
+        let whole = trial("whole", 30.0, irregular(1.0));
+        for (gap_s, settles) in [(0.3, false), (2.0, true), (3.3, true)] {
+            let cut = |values: &[f64]| -> Vec<f64> {
+                let kept = |i: &usize| !(10.0..10.0 + gap_s).contains(&whole.time_s[*i]);
+                (0..whole.len()).filter(kept).map(|i| values[i]).collect()
+            };
+            let channels = whole.channels.iter().map(|channel| Channel {
+                name: channel.name.clone(),
+                values: cut(&channel.values),
+            });
+            let cut = Trial {
+                name: "cut".into(),
+                time_s: cut(&whole.time_s),
+                channels: channels.collect(),
+            };
+            let readings = apply(&calibration, &cut).expect("readings").readings;
+            let at = cut.time_s.iter().position(|t| *t >= 10.0 + gap_s).expect("a gap");
+            assert_eq!(readings[at + 29] == Err(Withheld::Warming), settles, "{memory:?} {gap_s}");
+            let truth = cut.channel("length_mm").expect("a reference");
+            let error =
+                |i: usize| (readings[i].as_ref().expect("a reading").estimate - truth[i]).abs();
+            let worst = (at + 30..at + 130).map(error).fold(0.0, f64::max);
+            assert!(worst < 1.5, "{memory:?}, {gap_s} s: {worst} mm");
+        }
+    }
 }

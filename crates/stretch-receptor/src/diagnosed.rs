@@ -408,4 +408,8 @@ impl<T: Real> Live for Diagnosed<T> {
     fn pause(&self, memory: &mut DiagnosedMemory<T>) {
         self.bridge(memory, 0);
     }
+
+    fn restart(&self, memory: &mut DiagnosedMemory<T>) {
+        *memory = DiagnosedMemory { pressure: memory.pressure, ..self.memory() };
+    }
 }

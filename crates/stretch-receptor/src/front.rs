@@ -39,6 +39,11 @@ pub trait Live: Design {
     fn pause(&self, memory: &mut Self::Memory) {
         *memory = self.memory();
     }
+
+    /// Forgets the motion before a long gap. What changes slowly, such as a baseline, is kept.
+    fn restart(&self, memory: &mut Self::Memory) {
+        *memory = self.memory();
+    }
 }
 
 /// The part of [`Live`] that all models over a signal in volts share.
@@ -148,6 +153,25 @@ impl<M> Front<M> {
 }
 
 impl<M: Live> Front<M> {
+    /// Starts again after a gap of seconds, in which the target may have moved anywhere: the next sample is treated as
+    /// the first one. The branch, a baseline and the pressure are kept.
+    ///
+    /// ```
+    /// use stretch_core::{Design, Stage, Volts};
+    /// use stretch_receptor::{Receptor, example_observer};
+    /// let receptor = Receptor::<f64>::new(&example_observer())?;
+    /// let mut memory = receptor.memory();
+    /// let first = receptor.step(&mut memory, Volts(1.5));
+    /// assert_ne!(receptor.step(&mut memory, Volts(1.5)), first);
+    /// receptor.restart(&mut memory);
+    /// assert_eq!(receptor.step(&mut memory, Volts(1.5)), first);
+    /// # Ok::<(), stretch_receptor::ReceptorError>(())
+    /// ```
+    pub fn restart(&self, memory: &mut ReceptorMemory<M::Memory, M::Side>) {
+        self.model.restart(&mut memory.model);
+        memory.missing = MAX_BRIDGED;
+    }
+
     /// Bridges a short gap, and pauses during a longer one.
     #[cold]
     #[inline(never)]

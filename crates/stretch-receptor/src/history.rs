@@ -245,6 +245,10 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> Live for History<T, R> {
         self.bridge(memory, 0);
         (memory.baseline, memory.rate) = (baseline, self.rate.memory());
     }
+
+    fn restart(&self, memory: &mut Self::Memory) {
+        *memory = HistoryMemory { baseline: memory.baseline, ..self.memory() };
+    }
 }
 
 fn scales<T: Real>(map: &HistoryMap) -> ([T; MAX_STATES], [T; MAX_STATES]) {

@@ -293,4 +293,8 @@ impl<T: Real> Live for Observer<T> {
         memory.states[1] = T::zero();
         self.bridge(memory, 0);
     }
+
+    fn restart(&self, memory: &mut ObserverMemory<T>) {
+        *memory = ObserverMemory { baseline: memory.baseline, ..self.memory() };
+    }
 }

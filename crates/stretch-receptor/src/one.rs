@@ -160,4 +160,8 @@ impl<T: Real, R: Stage<T, Out = Option<T>>> Live for AnyModel<T, R> {
     fn pause(&self, memory: &mut Self::Memory) {
         with_its_own!(self, &mut *memory, |model, its| model.pause(its), *memory = self.memory());
     }
+
+    fn restart(&self, memory: &mut Self::Memory) {
+        with_its_own!(self, &mut *memory, |model, its| model.restart(its), *memory = self.memory());
+    }
 }

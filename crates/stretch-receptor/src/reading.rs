@@ -83,7 +83,8 @@ impl fmt::Display for Domain {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum Withheld {
-    /// The rate estimator has not seen enough samples yet, and the model needs a rate.
+    /// The rate estimator has not seen enough samples yet, and the model needs a rate; or the model settles after a
+    /// long gap.
     Warming,
     /// The sample was missing, not a number or too large. The receptor bridges a short gap
     /// ([`MAX_BRIDGED`](crate::MAX_BRIDGED)).

@@ -73,7 +73,7 @@ pub(super) fn warnings<'a>(
             Err(withheld) => *withheld == ArrayWithheld::AllLost,
         });
         let at = trial.time_s.iter().position(|time| time == time_s);
-        let sample = at.and_then(|at| trial.channel(signal.as_str())?.get(at).copied());
+        let sample = at.and_then(|at| trial.require(signal.as_str()).ok()?.get(at).copied());
         let beyond = |sample: f64| (sample - possible.max).max(possible.min - sample);
         let by = match sample.filter(|_| *loss == ArrayLoss::Outside) {
             Some(sample) => format!(", by {}", number(beyond(sample))),

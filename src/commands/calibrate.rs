@@ -398,10 +398,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         named => named.iter().fold(columns, |columns, name| columns.require(name)),
     };
     let (trials, is_table) = args.read(&mut columns)?;
+    options = options.named_as(&trials);
     options.is_table = is_table;
     // Outliers are removed only from the named columns, because candidate signals may be anything.
     // Rows of a table may be far apart, so nothing is removed from tables.
-    let named = [args.reference.as_str(), options.signal.as_str()];
+    let named = [options.reference.clone(), options.signal.clone()];
+    let named = [named[0].as_str(), named[1].as_str()];
     let named = if is_table { &[][..] } else { &named[..] };
     let (trials, gross_errors) = without_gross_errors(trials, named);
     let named = |error: CalibrateError| of_files(error, &args.trials);
@@ -485,8 +487,8 @@ fn rank(
 ) -> anyhow::Result<Vec<Candidate>> {
     let Signal::Best(names) = signal else { return Ok(Vec::new()) };
     let names = match &names[..] {
-        [] => other_columns(trials, std::slice::from_ref(&args.reference))?,
-        names => names.to_vec(),
+        [] => other_columns(trials, std::slice::from_ref(&options.reference))?,
+        names => full_names(trials, names),
     };
     let ranking = rank_signals(trials, &names, options);
     let ranking = ranking.map_err(|error| of_files(error, &args.trials))?;
@@ -594,6 +596,12 @@ fn verdict(
         evaluation: &evaluation,
         context: &context,
     })
+}
+
+/// Returns the full names of columns in the first trial.
+pub(super) fn full_names(trials: &[Trial], names: &[String]) -> Vec<String> {
+    let full = |name: &String| trials.first().map_or(&**name, |trial| trial.full_name(name)).into();
+    names.iter().map(full).collect()
 }
 
 /// Returns the columns of the first trial, except those in `but` and the estimates of `stretch listen` or of the live

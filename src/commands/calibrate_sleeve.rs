@@ -14,7 +14,7 @@ use stretch_sleeve::{
 };
 
 use super::{
-    calibrate::{Args, Signal, other_columns},
+    calibrate::{Args, Signal, full_names, other_columns},
     reading::{read_trials, with_columns_to_name},
     shared::{doubt, of_files, say_below, say_first, stage_text, with_unit},
 };
@@ -76,6 +76,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let trials = read_trials(&args.trials, Split::Fit, &columns);
     let own = "name your columns with --reference and --signal";
     let trials = trials.map_err(|error| with_columns_to_name(error, own))?;
+    let (references, named) = (full_names(&trials, &references), full_names(&trials, &named));
     let signals = if named.is_empty() { other_columns(&trials, &references)? } else { named };
     let of_trials = |error: SleeveError| of_files(error, &args.trials);
     let options = |reference: &str| SleeveOptions {

@@ -279,6 +279,13 @@ impl Options {
         }
     }
 
+    /// Returns the options with the full names of their columns in the trials, such as `voltage_v` for `Voltage`.
+    pub fn named_as(&self, trials: &[stretch_data::Trial]) -> Self {
+        let full =
+            |name: &str| trials.first().map_or(name, |trial| trial.full_name(name)).to_owned();
+        Self { signal: full(&self.signal), reference: full(&self.reference), ..self.clone() }
+    }
+
     pub(crate) fn needs_pressure(&self) -> bool {
         self.causes.iter().any(|cause| cause.effect == "pressure_crosstalk")
     }

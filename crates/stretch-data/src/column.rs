@@ -308,3 +308,49 @@ pub fn written_unit(spelt: &str) -> &str {
 pub fn spelt_unit(text: &str) -> Option<&'static str> {
     row_of(text.trim()).map(|row| row.0)
 }
+
+/// Converts a text to lower-case letters, digits and underscores.
+///
+/// ```
+/// assert_eq!(stretch_data::snake_case("Knee Angle (L)"), "knee_angle_l");
+/// ```
+pub fn snake_case(text: &str) -> String {
+    let mut name = String::new();
+    for c in text.trim().chars() {
+        if c.is_alphanumeric() {
+            name.extend(c.to_lowercase());
+        } else if !name.is_empty() && !name.ends_with('_') {
+            name.push('_');
+        }
+    }
+    name.trim_end_matches('_').to_owned()
+}
+
+/// Returns the column that a user means by `wanted`: the column with this name; otherwise the only column whose name
+/// differs in upper and lower case or in punctuation; otherwise the only one whose name is `wanted` followed by a unit.
+///
+/// ```
+/// use stretch_data::column_meant;
+/// let names = ["time_s", "voltage_v", "knee_angle_deg", "force_n", "force_kn"];
+/// assert_eq!(column_meant("Voltage", names), Some("voltage_v"));
+/// assert_eq!(column_meant("Knee Angle", names), Some("knee_angle_deg"));
+/// assert_eq!(column_meant("FORCE_N", names), Some("force_n"));
+/// assert_eq!(column_meant("force", names), None);
+/// assert_eq!(column_meant("voltage_mv", names), None);
+/// ```
+pub fn column_meant<'a>(wanted: &str, names: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let names: Vec<&str> = names.into_iter().collect();
+    let plain = snake_case(wanted);
+    let only = |is_one: &dyn Fn(&str) -> bool| {
+        let mut found = names.iter().copied().filter(|name| is_one(name));
+        found.next().filter(|_| !plain.is_empty() && found.next().is_none())
+    };
+    let without_unit = |name: &str| {
+        let unit = unit(name).filter(|unit| Quantity::of_unit(unit).is_some())?;
+        Some(snake_case(&name[..name.len() - unit.len()]))
+    };
+    let exact = names.iter().copied().find(|name| *name == wanted);
+    exact
+        .or_else(|| only(&|name| snake_case(name) == plain))
+        .or_else(|| only(&|name| without_unit(name).is_some_and(|name| name == plain)))
+}

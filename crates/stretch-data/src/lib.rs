@@ -15,7 +15,7 @@ mod trial;
 mod wrap;
 mod write;
 
-pub use column::{Quantity, spelt_unit, unit, unit_of, written_unit};
+pub use column::{Quantity, column_meant, snake_case, spelt_unit, unit, unit_of, written_unit};
 pub use data_set::{DataSet, Split, TrialEntry, TrialKind, digest_of, is_digest};
 pub use digits::{after_number, in_digits, resampling, significant};
 pub use error::{DataError, Place, error_sentence, listed, nearest, rename_options, shown};

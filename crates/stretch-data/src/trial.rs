@@ -2,7 +2,7 @@
 
 use std::iter;
 
-use crate::{DataError, Place, data_set::CRC};
+use crate::{DataError, Place, column_meant, data_set::CRC};
 
 /// A recording: time stamps and named channels of the same length.
 ///
@@ -62,7 +62,20 @@ impl Trial {
         self.channels.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
 
-    /// Returns the channel called `name`, or an error that lists the existing channels.
+    /// Returns the full name of the channel that `name` means: see [`column_meant`]. Any other name is returned unchanged.
+    ///
+    /// ```
+    /// use stretch_data::{Channel, Trial};
+    /// let channel = Channel { name: "voltage_v".into(), values: vec![1.5] };
+    /// let trial = Trial { time_s: vec![0.0], channels: vec![channel], ..Trial::default() };
+    /// assert_eq!([trial.full_name("Voltage"), trial.full_name("force_n")], ["voltage_v", "force_n"]);
+    /// ```
+    pub fn full_name<'a>(&'a self, name: &'a str) -> &'a str {
+        let names = self.channels.iter().map(|channel| channel.name.as_str());
+        column_meant(name, names).unwrap_or(name)
+    }
+
+    /// Returns the channel that `name` means, see [`column_meant`], or an error that lists the existing channels.
     ///
     /// # Errors
     /// [`DataError::MissingColumn`].
@@ -81,7 +94,7 @@ impl Trial {
     /// ```
     pub fn require(&self, name: &str) -> Result<&[f64], DataError> {
         let names = self.channels.iter().map(|channel| channel.name.as_str());
-        self.channel(name).ok_or_else(|| {
+        self.channel(self.full_name(name)).ok_or_else(|| {
             DataError::missing_column(&self.name, name, iter::once("time_s").chain(names))
         })
     }

@@ -112,5 +112,10 @@ pub(crate) fn read_sensors(
         true => Recording::session(&DataSet::read(path)?, path, &options)?,
         false => vec![SessionTrial::from(Recording::read(path, &options)?)],
     };
-    sensors(trials, reference, &signals, without)
+    let full =
+        |name: &str| trials.first().map_or(name, |first| first.trial.full_name(name)).to_owned();
+    let (reference, signals) = (full(reference), signals.into_iter().map(full));
+    let signals: Vec<String> = signals.collect();
+    let signals: Vec<&str> = signals.iter().map(String::as_str).collect();
+    sensors(trials, &reference, &signals, without)
 }

@@ -74,6 +74,9 @@ pub(crate) fn merged(
     options: &ReadOptions,
 ) -> Result<Recording, RecordingError> {
     tidy_names(&mut tracks, &mut notes, options);
+    let names: Vec<String> =
+        tracks.iter().flat_map(|t| &t.channels).map(|c| c.name.clone()).collect();
+    let options = &options.named_as(names.iter().map(String::as_str));
     for wanted in options.required() {
         find(file, &mut tracks, wanted)?;
     }

@@ -1,6 +1,6 @@
 //! Interprets the names of columns: reads units in brackets or in a separate row, and recognises names of the time.
 
-use stretch_data::spelt_unit;
+use stretch_data::{snake_case, spelt_unit};
 
 use crate::TimeUnit;
 
@@ -91,19 +91,6 @@ pub(crate) fn unit(text: &str) -> Option<String> {
     Some(spelt)
 }
 
-/// Converts a text to lower-case letters, digits and underscores.
-pub(crate) fn plain(text: &str) -> String {
-    let mut name = String::new();
-    for c in text.trim().chars() {
-        if c.is_alphanumeric() {
-            name.extend(c.to_lowercase());
-        } else if !name.is_empty() && !name.ends_with('_') {
-            name.push('_');
-        }
-    }
-    name.trim_end_matches('_').to_owned()
-}
-
 /// Converts a name to lower case with an underscore between its words: `time_us` for `TimeUS`, `t_ms` for `t (ms)`.
 pub(crate) fn words(name: &str) -> String {
     let mut parted = String::new();
@@ -113,7 +100,7 @@ pub(crate) fn words(name: &str) -> String {
         }
         parted.push(c);
     }
-    plain(&parted)
+    snake_case(&parted)
 }
 
 /// Converts a column's name to the project's notation: `pos_mm` for `Pos (mm)`, `force_n` for `force[N]`. Other names
@@ -135,7 +122,7 @@ pub(crate) fn tidy(name: &str, below: Option<&str>) -> Option<String> {
         Some(below) => (name, unit(unbracketed(below))?),
         None => bracketed(name)?,
     };
-    let base = plain(base);
+    let base = snake_case(base);
     Some(match &unit[..] {
         _ if base.is_empty() => return None,
         "" => base,
@@ -191,7 +178,7 @@ pub(crate) fn time_rank(name: &str) -> Option<usize> {
 /// Returns whether two columns together are a time stamp, such as `header.stamp.secs` and `header.stamp.nsecs`.
 pub(crate) fn are_a_stamp(seconds: &str, nanoseconds: &str) -> bool {
     let of = |name: &str, ends: &[&str]| {
-        let name = plain(name);
+        let name = snake_case(name);
         let (before, last) = name.rsplit_once('_').unwrap_or(("", &name));
         ends.contains(&last).then(|| before.to_owned())
     };
@@ -212,7 +199,7 @@ pub(crate) fn clock_of(name: &str) -> Option<String> {
         ("", tag) => tag.to_owned(),
         (group, tag) => format!("{group}/{tag}"),
     };
-    let last = plain(last);
+    let last = snake_case(last);
     if time_rank(&last).is_some() {
         return Some(within(""));
     }

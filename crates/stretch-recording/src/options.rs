@@ -2,6 +2,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize, de::value::StrDeserializer};
+use stretch_data::column_meant;
 
 use crate::names::{unit, words};
 
@@ -279,6 +280,13 @@ impl ReadOptions {
     /// Returns the columns that were requested with [`require`](Self::require), in this order.
     pub fn required(&self) -> &[String] {
         &self.required
+    }
+
+    /// Returns the options with the required columns under their full names in a recording.
+    pub(crate) fn named_as<'a>(&self, names: impl IntoIterator<Item = &'a str> + Clone) -> Self {
+        let full = |name: &String| column_meant(name, names.clone()).unwrap_or(name).to_owned();
+        let of = |columns: &[String]| columns.iter().map(full).collect();
+        Self { required: of(&self.required), gappy: of(&self.gappy), ..self.clone() }
     }
 
     /// Returns the counts per second of a time column with this name.

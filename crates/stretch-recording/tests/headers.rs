@@ -323,3 +323,40 @@ fn a_name_without_numbers_below_it_is_no_time() {
     assert_eq!((trial.rate_hz(), trial.time_s[1]), (Some(50.0), 0.02));
     assert!(RowReader::new(text.as_bytes(), "t.csv", &ReadOptions::new()).is_err());
 }
+
+/// A column that is asked for without its unit, or in other case, is found if only one column can be meant, and it keeps
+/// its unit. Otherwise the error lists the columns.
+#[test]
+fn columns_are_found_by_base_name_and_in_other_case() {
+    let with_units = format!("Time,Knee Angle,Voltage\ns,deg,V\n{}", rows(",", ""));
+    let plain = format!("time_s,knee_angle_deg,voltage_v\n{}", rows(",", ""));
+    let [packed, read] = [&with_units, &plain].map(|text| {
+        let read = |options: &ReadOptions| {
+            let recording = Recording::from_reader(text.as_bytes(), "t.csv", options);
+            recording.map(|recording| recording.trial)
+        };
+        for asked in [["Knee Angle", "Voltage"], ["knee_angle", "VOLTAGE_V"]] {
+            let options = asked.iter().fold(ReadOptions::new(), |all, name| all.require(*name));
+            let trial = read(&options).unwrap_or_else(|e| panic!("{asked:?}: {e}"));
+            let names: Vec<&str> = trial.channels.iter().map(|c| c.name.as_str()).collect();
+            assert_eq!(names, ["knee_angle_deg", "voltage_v"], "{asked:?} of {text:.60}");
+            for name in asked {
+                assert!(trial.require(name).is_ok(), "{name}");
+            }
+            // A live stream finds the same columns.
+            let mut live = RowReader::new(text.as_bytes(), "t.csv", &options).expect("a header");
+            let row = live.next_row().expect("a row").expect("numbers");
+            assert_eq!(row.values, [100.0, 1.0]);
+        }
+        (read(&ReadOptions::new().time("TIME")), read(&ReadOptions::new().require("voltage_mv")))
+    });
+    for (time, other) in [packed, read] {
+        assert_eq!(time.expect("a time").len(), 40);
+        let error = other.expect_err("another unit").to_string();
+        assert!(error.contains("did you mean voltage_v?"), "{error}");
+    }
+    let two = format!("time_s,force_n,force_kn\n{}", rows(",", ""));
+    let asked = ReadOptions::new().require("force");
+    let error = Recording::from_reader(two.as_bytes(), "t.csv", &asked).expect_err("two of them");
+    assert!(error.to_string().contains("the columns are time_s, force_n, force_kn"), "{error}");
+}

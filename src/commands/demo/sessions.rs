@@ -8,7 +8,7 @@ use std::{
 };
 
 use anyhow::{Context, bail, ensure};
-use stretch_data::{DataSet, SessionTrial, Split, Trial, TrialEntry, TrialKind};
+use stretch_data::{DataSet, SessionTrial, Split, Trial, TrialEntry, TrialKind, column_meant};
 use stretch_problem::{GaugeSetup, GaugeSimulator, Problem, Reading, name_of};
 use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::Catalogue;
@@ -70,14 +70,15 @@ impl Sessions {
         let has = |name: &str| columns.iter().any(|c| c.name == name);
         let usual = || REFERENCES.into_iter().find(|name| has(name));
         let named = || columns.iter().map(|c| c.name.as_str()).collect::<Vec<_>>().join(", ");
-        let Some(reference) = reference.or_else(usual).filter(|name| has(name)) else {
+        let full = |name| column_meant(name, columns.iter().map(|c| c.name.as_str()));
+        let Some(reference) = reference.or_else(usual).and_then(full) else {
             bail!(
                 "--data: name the reference with --reference; the columns of the sessions {name} are {}",
                 named()
             );
         };
         let signals: Vec<String> = match signal {
-            Some(signal) => vec![signal.to_owned()],
+            Some(signal) => vec![full(signal).unwrap_or(signal).to_owned()],
             None if has(SIGNAL) => vec![SIGNAL.to_owned()],
             None => columns
                 .iter()

@@ -178,7 +178,7 @@ impl Applied {
     /// Returns the counts of a trial to which the calibration was applied, and doubts about the estimates.
     pub fn seen(&self, calibration: &Calibration, trial: &Trial) -> (Seen, Vec<Doubt>) {
         let mut seen = Seen::of(&at_own_rate(calibration, trial));
-        let signal = trial.channel(calibration.spec().signal.as_str()).into_iter().flatten();
+        let signal = trial.require(calibration.spec().signal.as_str()).into_iter().flatten();
         let samples = trial.time_s.iter().zip(signal).zip(&self.readings);
         let pace = samples.filter_map(|((time_s, signal), reading)| {
             Some(seen.take(*time_s, *signal, reading)?.of(&trial.name))
@@ -220,7 +220,7 @@ pub fn evaluation_doubts(
         let errors = &evaluation.pooled[method];
         let mut reach = Reach::of(calibration);
         let signal = calibration.spec().signal.as_str();
-        let signals = trials.iter().filter_map(|trial| trial.channel(signal));
+        let signals = trials.iter().filter_map(|trial| trial.require(signal).ok());
         signals.flatten().for_each(|value| reach.take(*value));
         let spec = calibration.spec();
         let unit = spec.target.reference_per_normalised(spec.target_range).abs();

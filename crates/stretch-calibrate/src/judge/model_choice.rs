@@ -105,6 +105,7 @@ pub fn choose_model_watched(
     options: &Options,
     report: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<ModelChoice, CalibrateError> {
+    let options = &options.named_as(trials);
     let rows: usize = trials.iter().map(Trial::len).sum();
     let candidates = candidate_models(options);
     let mut judged = Vec::new();

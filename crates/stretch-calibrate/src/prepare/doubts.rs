@@ -229,8 +229,8 @@ impl Held<'_> {
 
 /// Returns a sentence if the signal of a trial is stuck at an end of its range while the reference moves further.
 pub(crate) fn clipped(trial: &Trial, [signal, reference]: [&str; 2]) -> Option<String> {
-    let columns = [signal, reference].map(|name| trial.channel(name));
-    let [Some(signals), Some(references)] = columns else { return None };
+    let columns = [signal, reference].map(|name| trial.require(name));
+    let [Ok(signals), Ok(references)] = columns else { return None };
     let piece = (0, [signals.to_vec(), references.to_vec(), Vec::new()]);
     let line = Line::of(std::iter::once(&piece));
     Held { name: &trial.name, parts: vec![&piece], line }.clipped(signal, reference)

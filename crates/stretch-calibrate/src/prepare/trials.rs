@@ -55,6 +55,7 @@ pub(crate) struct Prepared {
 
 impl Prepared {
     pub(crate) fn new(trials: &[Trial], options: &Options) -> Result<Self, CalibrateError> {
+        let options = &options.named_as(trials);
         if options.signal == options.reference {
             return Err(CalibrateError::Refused(format!(
                 "{} is both the signal and the reference, but a calibration needs two columns: choose another column, or record a reference, such as length_mm, in the same file",

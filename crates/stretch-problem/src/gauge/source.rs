@@ -49,6 +49,8 @@ impl GaugeSimulator {
         let Some((reference, signal)) = columns_of(&first.trial, columns, says_so)? else {
             return Ok(None);
         };
+        let (reference, signal) = (reference.to_owned(), signal.to_owned());
+        let (reference, signal) = (reference.as_str(), signal.as_str());
         let trials = match &set {
             // The recording is read once, because it may be standard input.
             None => vec![SessionTrial::from(first)],
@@ -65,13 +67,15 @@ impl GaugeSimulator {
 
 /// Reference and signal; `None` if the trial is of a whole rig.
 fn columns_of<'a>(
-    first: &Trial,
+    first: &'a Trial,
     named: Option<(&'a str, &'a str)>,
     says_so: bool,
 ) -> Result<Option<(&'a str, &'a str)>, ProblemError> {
     let has = |name: &str| first.channel(name).is_some();
     match named {
-        Some(columns) => Ok(Some(columns)),
+        Some((reference, signal)) => {
+            Ok(Some((first.full_name(reference), first.full_name(signal))))
+        }
         None if !says_so && (has("inlet") || has("outlet")) => Ok(None),
         None if has(USUAL.0) && has(USUAL.1) => Ok(Some(USUAL)),
         None => {

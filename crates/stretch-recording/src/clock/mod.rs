@@ -8,7 +8,7 @@ mod order;
 mod spread;
 pub(crate) mod unit;
 
-use stretch_data::{Place, out_of_order};
+use stretch_data::{Place, column_meant, out_of_order};
 
 use crate::{
     ReadOptions, RecordingError,
@@ -152,10 +152,14 @@ pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usiz
         may_be.next().filter(|_| may_be.next().is_none()).map(|(i, _)| i)
     };
     let guessed = || usual().or_else(|| options.sample_rate_hz.map_or_else(only, |_| None));
+    let meant = || {
+        let name = column_meant(wanted, names.iter().map(String::as_str))?;
+        names.iter().position(|other| other == name)
+    };
     names
         .iter()
         .position(|name| name == wanted)
-        .or_else(|| if wanted == TIME { guessed() } else { None })
+        .or_else(|| if wanted == TIME { guessed() } else { meant() })
 }
 
 /// Returns the note that samples are counted and that a time column, if there is one, is not read.

@@ -1,6 +1,6 @@
 //! The names of a table's columns.
 
-use stretch_data::{DataError, Place, shown};
+use stretch_data::{DataError, Place, column_meant, shown};
 
 use crate::{
     ReadOptions, RecordingError,
@@ -89,9 +89,11 @@ impl Header {
         Ok((time, rate_hz))
     }
 
-    /// Returns the index of column `name`.
+    /// Returns the index of the column that `name` means.
     pub(crate) fn position(&self, file: &str, name: &str) -> Result<usize, RecordingError> {
-        self.names.iter().position(|n| n == name).ok_or_else(|| {
+        let meant = column_meant(name, self.names.iter().map(String::as_str));
+        let position = meant.and_then(|name| self.names.iter().position(|n| n == name));
+        position.ok_or_else(|| {
             DataError::missing_column(file, name, self.names.iter().map(String::as_str)).into()
         })
     }

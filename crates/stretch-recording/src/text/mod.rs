@@ -50,7 +50,8 @@ pub(crate) fn read(
             taken.map_err(|problem| RecordingError::format(file, format, problem))?;
         }
     }
-    table.finish(options)
+    let options = options.named_as(table.header.names.iter().map(String::as_str));
+    table.finish(&options)
 }
 
 /// A table while it is read.
@@ -95,6 +96,7 @@ impl<'a> Table<'a> {
     ) -> Result<Self, RecordingError> {
         let Top { header, mut notes, stated_hz, .. } = top;
         let (time, rate_hz) = header.time(file, stated_hz, options, &mut notes)?;
+        let options = &options.named_as(header.names.iter().map(String::as_str));
         let read = time.filter(|_| rate_hz.is_none());
         if let Some(name) = read.map(|i| &header.names[i]).filter(|name| **name != options.time) {
             notes.push(format!("the time is column {name}"));

@@ -1,10 +1,8 @@
 //! The sample rate that the lines above a table state.
 
-use crate::{
-    TimeUnit,
-    names::{plain, unit},
-    text::dialect::cells,
-};
+use stretch_data::snake_case;
+
+use crate::{TimeUnit, names::unit, text::dialect::cells};
 
 /// Names of a field with the sample interval.
 const INTERVALS: [&str; 9] = [
@@ -50,7 +48,7 @@ fn rate_of(key: &str, value: &str) -> Option<f64> {
         Some(key) => key.split_once(['(', '['])?,
         None => (key, ""),
     };
-    let key = plain(key);
+    let key = snake_case(key);
     let value = value.trim().replace(',', ".");
     let (number, length) = fast_float2::parse_partial::<f64, _>(&value).ok()?;
     let of_value = value.get(length..)?.trim();

@@ -62,7 +62,7 @@ impl Top {
 }
 
 /// Rewrites names with units in the project's notation, such as `pos_mm` for `Pos (mm)`, and adds a note. Requested
-/// names stay.
+/// names stay, unless their unit is in the row below, because it would be lost.
 fn tidy_names(
     names: &[String],
     units: &[String],
@@ -72,8 +72,10 @@ fn tidy_names(
     let mut renamed = Vec::new();
     let tidied = names.iter().enumerate().map(|(i, name)| {
         let is_other = |tidied: &String| tidied == name || names.contains(tidied);
-        let tidied = tidy(name, units.get(i).map(String::as_str)).filter(|t| !is_other(t));
-        let Some(tidied) = tidied.filter(|_| !options.asked().contains(&name)) else {
+        let below = units.get(i).map(String::as_str).filter(|unit| !unit.is_empty());
+        let stays = below.is_none() && options.asked().contains(&name);
+        let tidied = tidy(name, below).filter(|t| !is_other(t));
+        let Some(tidied) = tidied.filter(|_| !stays) else {
             return name.clone();
         };
         renamed.push(format!("{} -> {tidied}", shown(name.as_bytes())));

@@ -75,7 +75,7 @@ pub fn missing_turns(gauge: &GaugeCalibration, trials: &[Trial]) -> Option<Strin
     if gauge.turns().is_some() || spec.model.needs_signal_only() {
         return None;
     }
-    let signals = trials.iter().filter_map(|trial| trial.channel(spec.signal.as_str()));
+    let signals = trials.iter().filter_map(|trial| trial.require(spec.signal.as_str()).ok());
     let finite = |signal: &[f64]| signal.iter().copied().filter(|v| v.is_finite()).collect();
     let signals: Vec<Vec<f64>> = signals.map(finite).collect();
     let signals: Vec<&[f64]> = signals.iter().map(Vec::as_slice).collect();

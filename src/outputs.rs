@@ -36,13 +36,20 @@ fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
     for argument in command.get_arguments() {
         let Some(name) = option(argument).filter(|name| OUTPUTS.contains(name)) else { continue };
         let example = argument.get_value_names().unwrap_or_default().concat();
-        let paths = matches.get_many::<PathBuf>(argument.get_id().as_str());
-        found.extend(paths.into_iter().flatten().map(|path| Output {
+        let id = argument.get_id().as_str();
+        let paths = matches.get_many::<PathBuf>(id).into_iter().flatten();
+        let places = matches.indices_of(id).into_iter().flatten();
+        found.extend(paths.zip(places).map(|(path, place)| Output {
             option: format!("--{name}"),
             path: path.clone(),
             example: example.clone(),
-            // Estimates have words in their rows and are not mistaken for a recording.
-            replaces_recordings: !["apply", "convert"].contains(&command.get_name()),
+            replaces_recordings: match command.get_name() {
+                // Estimates have words in their rows and are not mistaken for a recording.
+                "apply" => false,
+                // A file name after the output may come from a shell that expanded --out *.csv.
+                "convert" => !is_at(command, matches, place + 1),
+                _ => true,
+            },
         }));
     }
     if let Some((name, matches)) = matches.subcommand()
@@ -50,6 +57,12 @@ fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
     {
         named(command, matches, found);
     }
+}
+
+/// Whether a positional argument has this place on the command line.
+fn is_at(command: &Command, matches: &ArgMatches, place: usize) -> bool {
+    let indices = |argument: &Arg| matches.indices_of(argument.get_id().as_str());
+    command.get_positionals().filter_map(indices).flatten().any(|index| index == place)
 }
 
 /// Guards the inputs of a command against being overwritten by its outputs.
@@ -102,6 +115,32 @@ mod tests {
     fn paths(command: &Command, found: &mut Vec<String>) {
         found.extend(command.get_arguments().filter_map(option).map(str::to_owned));
         command.get_subcommands().for_each(|command| paths(command, found));
+    }
+
+    /// `convert` replaces its own output. It replaces no recording whose name a shell may have inserted.
+    #[test]
+    fn a_converted_recording_is_replaced_by_the_same_command() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| folder.path().join(name).display().to_string();
+        let (log, trial) = (path("log.csv"), path("trial.csv"));
+        for file in [&log, &trial] {
+            std::fs::write(file, "time_s,length_mm\n0,1\n1,2\n2,3\n").expect("a recording");
+        }
+        let guarded = |words: &[&str]| {
+            let command = crate::command();
+            let words = std::iter::once("stretch").chain(words.iter().copied());
+            let matches = command.clone().try_get_matches_from(words).expect("a command line");
+            guard(&command, &matches)
+        };
+        assert!(guarded(&["convert", &log, "--out", &trial]).is_ok());
+        assert!(guarded(&["convert", &log, "--out", &trial, "--grid", "50"]).is_ok());
+        for refused in [
+            &["convert", "--out", &trial, &log][..],
+            &["apply", &log, "--calibration", "c.json", "--out", &trial],
+        ] {
+            let error = guarded(refused).expect_err("a recording").to_string();
+            assert!(error.contains("this file is a recording and is not overwritten"), "{error}");
+        }
     }
 
     #[test]

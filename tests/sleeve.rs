@@ -159,7 +159,7 @@ fn several_gauges_are_evaluated_together_and_each_alone() {
         (String::from_utf8(output.stdout).unwrap(), one_line(&said))
     };
     let (shown, _) = evaluate(&["test.csv"]);
-    assert!(shown.starts_with("both is off by "), "{shown}");
+    assert!(shown.starts_with("Calibration both is off by "), "{shown}");
     assert!(
         shown.contains("s1 alone") && shown.contains("s2 alone") && !shown.contains("raw"),
         "{shown}"

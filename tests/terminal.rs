@@ -166,7 +166,10 @@ fn quiet_says_results_and_errors_and_verbose_says_how() {
         prints(command.args(flags))
     };
     let (usual, quiet, all) = (judged(&[]), judged(&["-q"]), judged(&["-v"]));
-    assert!(quiet.starts_with("cal is off by") && quiet.lines().count() <= 2, "{quiet}");
+    assert!(
+        quiet.starts_with("Calibration cal is off by") && quiet.lines().count() <= 2,
+        "{quiet}"
+    );
     assert!(usual.starts_with(&quiet) && usual.contains("Bias, mm"), "{usual}");
     assert!(all.starts_with(&quiet) && all.contains("paired t test"), "{all}");
     assert!(!usual.contains("paired t test") && usual.lines().count() <= 17, "{usual}");
@@ -176,7 +179,7 @@ fn quiet_says_results_and_errors_and_verbose_says_how() {
         many.arg("--calibration").arg(scratch.path("cal.json"));
     });
     let many = prints(many.arg(&trial));
-    assert!(many.starts_with("cal, the best of 10, is off by"), "{many}");
+    assert!(many.starts_with("Calibration cal, the best of 10, is off by"), "{many}");
     assert!(many.contains("(9 of 11 rows)"), "{many}");
     assert_eq!(nothing, "");
     for part in [" s] read a.csv: 2000 samples", " s] fitted poly13 to length_mm", " s] the end"] {

@@ -42,7 +42,7 @@ pub(super) fn blocks_of_models(choice: &ModelChoice, reference: &str) -> Vec<Str
     if is_verbose() {
         blocks.push(format!("Models: {MODELS_IN_WORDS}."));
         blocks.push(
-            "worst: the largest error. coefficients: their number. M3 instr.: measured instructions per sample on a Cortex-M3, f32 (fixed point). \
+            "worst: the largest error. coefficients: their number. instructions: measured for one sample, with f32 and, in brackets, in fixed point. \
              MSE above best: mean squared error minus that of the best model. \u{b1}: one standard error."
                 .to_owned(),
         );
@@ -54,6 +54,11 @@ pub(super) fn blocks_of_models(choice: &ModelChoice, reference: &str) -> Vec<Str
     }
     blocks
 }
+
+/// Headings of the table of fits. Without `-v`, only the first four columns are shown, because the sentence above the
+/// table has the error.
+const FITS: [&str; 6] =
+    ["fit", "model", "samples", "R^2", "residual SD, % of range", "condition number"];
 
 /// Number of signals that are listed without `-v`.
 const MOST_SIGNALS: usize = 12;
@@ -110,7 +115,7 @@ fn table_of_models(rows: &[&ModelRow], chosen: &str) -> String {
         "delay ms",
         "worst",
         "coefficients",
-        "M3 instr. (fixed)",
+        "instructions on a Cortex-M3 (fixed point)",
         SQUARED_EXCESS,
     ];
     let rows: Vec<Vec<String>> = rows.iter().map(row).collect();
@@ -180,18 +185,24 @@ pub(super) fn blocks_of_calibration(
 
 /// Formats the quality of each fit.
 fn table_of_fits(calibrated: &Calibrated) -> String {
+    let shown = if is_verbose() { FITS.len() } else { 4 };
     let row = |fit: &FitReport| {
-        vec![
+        let mut cells = vec![
             fit.name.clone(),
             fit.model.clone(),
             fit.samples.to_string(),
             format!("{:.4}", fit.r_squared),
             number(100.0 * fit.rmse),
             number(fit.condition),
-        ]
+        ];
+        cells.truncate(shown);
+        cells
     };
-    let header = ["fit", "model", "samples", "R^2", "RMSE % of range", "condition"];
-    table(&header, calibrated.fits.iter().map(row))
+    let table = table(&FITS[..shown], calibrated.fits.iter().map(row));
+    let words = "residual SD: standard deviation of the residuals of the fit. It exceeds their RMSE, because the number of coefficients \
+                 is subtracted from that of the samples. condition number: a large one means that the data hardly determine \
+                 the coefficients.";
+    if is_verbose() { format!("{table}\n{words}") } else { table }
 }
 
 /// Formats the coefficients of each fit, and the orders among which it was chosen.

@@ -14,7 +14,7 @@ use stretch_calibrate::{
 };
 use stretch_data::files::{write_folder, write_whole};
 use stretch_data::{Trial, TrialKind, listed};
-use stretch_problem::{Examined, Problem, in_words};
+use stretch_problem::{Causes, Examined, Problem, in_words};
 use stretch_report::{Context, Judged, Subject, calibration_verdict, demo_page, readme_picture};
 use stretch_sim::{ActiveEffect, RunSettings, TrialPlan, demo_preset, effect_named};
 
@@ -262,6 +262,11 @@ impl Calibrations {
         let ramps = sessions.ramps();
         let linear = calibrate(&ramps, &Options { model: ModelKind::Linear, ..options.clone() })?;
         let surfaces = calibrate(&ramps, options)?;
+        // The same candidates as those of stretch calibrate --model auto.
+        bar.set_message("diagnosing the gauge");
+        let show = |text: &str| bar.set_message(text.to_owned());
+        let causes = Causes::of(fit, options, &show, &|| false).without_missing_pressure(fit);
+        let options = &Options { causes: causes.found, ..options.clone() };
         bar.set_message("choosing a model by cross-validation");
         let choice = choose_model(fit, options)?;
         let chosen = calibrate(fit, &Options { model: choice.model, ..options.clone() })?;

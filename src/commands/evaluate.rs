@@ -94,7 +94,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         for trial in &trials {
             let applied = apply_array(calibration, trial)?;
             warnings(calibration, trial, &applied)
-                .for_each(|text| tell(&format!("{name}: {text}")));
+                .for_each(|text| tell(&format!("calibration {name}: {text}")));
         }
     }
     array_doubts(&named, &trials, &evaluation).iter().for_each(|doubt| tell(doubt));
@@ -121,7 +121,7 @@ fn array_doubts(
         let spec = calibration.spec();
         let columns: Vec<&str> = columns_of(calibration).collect();
         let fitted = fitted_trials(&spec.provenance, &columns, trials);
-        all.extend(fitted.map(|doubt| doubt.of(name)));
+        all.extend(fitted.map(|doubt| doubt.of(&format!("calibration {name}"))));
     }
     let specs = || calibrations.iter().map(|(_, own)| own.spec());
     for (method, spec) in specs().enumerate() {
@@ -167,8 +167,8 @@ const MOST_SHOWN: usize = 9;
 fn print(evaluation: &Evaluation, compared: Range<usize>) -> anyhow::Result<()> {
     let Evaluation { unit, trials, pooled, comparisons } = evaluation;
     let name = |i: usize| match (compared.len(), &pooled[i].method) {
-        (0 | 1, method) => method.clone(),
-        (count, method) => format!("{method}, the best of {count},"),
+        (0 | 1, method) => format!("Calibration {method}"),
+        (count, method) => format!("Calibration {method}, the best of {count},"),
     };
     if let Some(errors) = errors_in_words(&pooled[..compared.end], unit, name) {
         say_first(errors)?;

@@ -84,7 +84,8 @@ pub(crate) fn print_note(name: &str, note: &str) {
 pub(crate) fn with_notes_printed(Recording { trial, notes }: Recording) -> Trial {
     notes.iter().for_each(|note| print_note(&trial.name, note));
     let names: Vec<&str> = trial.channels.iter().map(|channel| channel.name.as_str()).collect();
-    let rate = trial.rate_hz().map_or(String::new(), |hz| format!(", {hz:.4} per second"));
+    let rate = trial.rate_hz().filter(|_| !trial.counts_rows());
+    let rate = rate.map_or(String::new(), |hz| format!(", {hz:.4} per second"));
     detail(format!("read {}: {} samples of {}{rate}", trial.name, trial.len(), names.join(", ")));
     trial
 }

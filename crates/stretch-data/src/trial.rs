@@ -46,6 +46,15 @@ pub fn check_rows<'a>(
     if rows <= most { Ok(()) } else { Err(DataError::TooLong { rows, most }) }
 }
 
+/// Whether the times are the numbers of rows: 0, 1, 2, ... See [`Trial::counts_rows`].
+///
+/// ```
+/// assert!(stretch_data::are_row_numbers(&[0.0, 1.0]) && !stretch_data::are_row_numbers(&[0.0, 0.1]));
+/// ```
+pub fn are_row_numbers(time_s: &[f64]) -> bool {
+    time_s.iter().zip(0_u32..).all(|(time_s, row)| *time_s == f64::from(row))
+}
+
 impl Trial {
     /// Returns the number of samples.
     pub fn len(&self) -> usize {
@@ -120,6 +129,19 @@ impl Trial {
             values.for_each(|value| checksum.update(&value.to_bits().to_le_bytes()));
         }
         (!self.is_empty()).then(|| checksum.finalize())
+    }
+
+    /// Whether the time is the number of the row (0, 1, 2, ...), as for a table without a time column. Such a trial has no
+    /// rates and no lag.
+    ///
+    /// ```
+    /// use stretch_data::Trial;
+    /// let of = |time_s: &[f64]| Trial { time_s: time_s.to_vec(), ..Trial::default() };
+    /// assert!(of(&[0.0, 1.0, 2.0]).counts_rows());
+    /// assert!(!of(&[0.0, 0.01, 0.02]).counts_rows());
+    /// ```
+    pub fn counts_rows(&self) -> bool {
+        are_row_numbers(&self.time_s)
     }
 
     /// Returns the time from the first sample to the last, s; 0 for fewer than two samples.

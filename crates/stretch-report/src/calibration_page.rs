@@ -4,7 +4,7 @@ use stretch_calibrate::{
     CalibrateError, Calibrated, Candidate, Evaluation, MODELS_IN_WORDS, MethodErrors, ModelChoice,
     ModelKind, Options, TrialErrors, evaluate,
 };
-use stretch_data::{Trial, listed};
+use stretch_data::{Trial, are_row_numbers, listed};
 use stretch_problem::in_words;
 
 use super::{
@@ -130,11 +130,15 @@ pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
     let Judged { calibrated, evaluation, context } = *subject;
     let names = method_names(calibrated, evaluation);
     // pictures come first, because they show what the numbers below mean
+    let is_table = evaluation.trials.iter().all(|trial| are_row_numbers(&trial.time_s));
     let liveliest = with_most_motion(&evaluation.trials);
-    over_time(page, evaluation, liveliest, &names);
-    loops(page, calibrated, evaluation, liveliest, &names);
-    judged(page, evaluation, &names, context);
-    errors(page, evaluation, &names);
+    // The rows of a table have no course over time.
+    if !is_table {
+        over_time(page, evaluation, liveliest, &names);
+    }
+    loops(page, calibrated, evaluation, liveliest, &names, is_table);
+    judged(page, evaluation, &names, context, is_table);
+    errors(page, evaluation, &names, is_table);
     shapes(page, calibrated, &evaluation.unit);
     fits(page, calibrated, context);
 }
@@ -199,7 +203,13 @@ pub fn errors_in_words(
     Some(format!("{is_off} (RMSE, {percent}\u{a0}% of the range){raw}."))
 }
 
-fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &Context) {
+fn judged(
+    page: &mut Page,
+    evaluation: &Evaluation,
+    names: &[String],
+    context: &Context,
+    is_table: bool,
+) {
     page.section("How good it is", "");
     page.text(&format!(
         "Fitted on {}; compared with {}.",
@@ -245,6 +255,9 @@ fn judged(page: &mut Page, evaluation: &Evaluation, names: &[String], context: &
         };
         page.folded("Are the differences more than chance?", |page| {
             page.table(&comparison_table(&evaluation.comparisons, &evaluation.unit, called));
+            if is_table {
+                return;
+            }
             page.text(
                 "Neighbouring samples resemble each other: P over means of half-second blocks is more reliable than P over samples, \
                  which is reported as in the paper.",
@@ -302,6 +315,7 @@ fn loops(
     evaluation: &Evaluation,
     liveliest: Option<usize>,
     names: &[String],
+    is_table: bool,
 ) {
     let (Some((_, first)), Some(best)) = (calibrated.first(), best(&evaluation.pooled)) else {
         return;
@@ -318,11 +332,16 @@ fn loops(
     );
     page.figure(
         &signal_figure(evaluation, shown, (best, name), first.calibration.spec().signal.as_str()),
-        "All recordings, and the estimates in the eight seconds that are drawn first above.",
+        match is_table {
+            true => "All rows, and estimates of some of them.",
+            false => {
+                "All recordings, and the estimates in the eight seconds that are drawn first above."
+            }
+        },
     );
 }
 
-fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
+fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String], is_table: bool) {
     let intro = "Error is estimate minus reference. Dots are samples from every part of the axis, \
                  the strong line is the median of all, the band holds four fifths of them; about \
                  one sample in a hundred lies beyond the frame.";
@@ -335,7 +354,8 @@ fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String]) {
         error_figure(evaluation, names, Against::Reference),
         "Against the reference: what a model of the wrong shape gets wrong.".to_owned(),
     );
-    page.figures(&[rate, place]);
+    let shown = [rate, place];
+    page.figures(&shown[usize::from(is_table)..]);
 }
 
 fn shapes(page: &mut Page, calibrated: &[(&str, &Calibrated)], unit: &str) {

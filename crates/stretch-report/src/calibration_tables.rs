@@ -143,7 +143,7 @@ pub fn order_table(fit: &FitReport) -> Table {
         ]
     };
     let caption = format!("Orders, {}; errors in normalised target", fit.name);
-    let head = ["Order", "Terms", "R\u{b2}", "RMSE", "RMSE, left out", "Remarks"];
+    let head = ["Order", "Terms", "R\u{b2}", "Residual SD", "RMSE, left out", "Remarks"];
     let best = fit.orders.iter().position(|o| Some(&o.model) == fit.recommended.as_ref());
     Table::new(caption, &head, fit.orders.iter().map(row)).highlight(best)
 }
@@ -163,7 +163,7 @@ pub(crate) fn coefficient_table(fit: &FitReport) -> Table {
         vec![c.name.clone(), term, number(c.estimate, 4), number(c.lower, 4), number(c.upper, 4)]
     };
     let caption = format!(
-        "Coefficients, {} ({}): {} samples, R\u{b2} {}, RMSE {} in normalised target",
+        "Coefficients, {} ({}): {} samples, R\u{b2} {}, residual SD {} in normalised target",
         fit.name,
         fit.model,
         fit.samples,

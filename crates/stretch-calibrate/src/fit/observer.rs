@@ -71,13 +71,14 @@ pub(crate) fn observer(
     Ok(((Model::Observer(map), vec![report], vec![note]), Choice::Observer(choice)))
 }
 
-/// States the noise of the signal and the spectral density of the rate's random walk (the agility, 1/s^3).
+/// States the noise of the signal, and the standard deviation of the change of speed in a second. The speed is a random
+/// walk with the spectral density `agility`, 1/s^3.
 pub(super) fn in_words(prepared: &Prepared, noise: f64, agility: f64) -> String {
     let noise = format!("{noise:.4} {}", unit_of(&prepared.options.signal));
     format!(
-        "the noise of the signal is {}; the estimate expects a speed that changes at random (spectral density {agility} 1/s^3; a greater value \
-         follows faster motions)",
-        noise.trim_end()
+        "the noise of the signal is {}; the estimate expects that the speed changes at random, by {:.2} ranges a second within a second",
+        noise.trim_end(),
+        agility.sqrt()
     )
 }
 

@@ -29,7 +29,8 @@ pub struct FitReport {
     pub r_squared: f64,
     /// Coefficient of determination, adjusted for the number of terms.
     pub adjusted_r_squared: f64,
-    /// `sqrt(SSE/(n - p))`, in normalised target.
+    /// Standard deviation of the residuals, `sqrt(SSE/(n - p))`, in normalised target. The RMSE of the estimates is
+    /// smaller for a short fit, because `p` is not subtracted.
     pub rmse: f64,
     /// Condition number of the design matrix, with the rows of a ridge if the fit has one. The design matrix of an
     /// observer holds curve, dynamics and time constants. The value is 1 for a diagnosed model, because it is not

@@ -196,14 +196,16 @@ fn at_own_rate(calibration: &Calibration, trial: &Trial) -> Calibration {
 }
 
 /// Returns doubts about the errors that [`evaluate`](crate::evaluate()) found for calibrations on trials. Each sentence
-/// begins with the calibration's name.
+/// names its calibration.
 pub fn evaluation_doubts(
     calibrations: &[(&str, &Calibration)],
     trials: &[Trial],
     evaluation: &Evaluation,
 ) -> Vec<Doubt> {
     let mut all = Vec::new();
-    for (name, calibration) in calibrations {
+    let named: Vec<(String, &Calibration)> =
+        calibrations.iter().map(|(name, own)| (format!("calibration {name}"), *own)).collect();
+    for (name, calibration) in &named {
         let paces = trials.iter().filter_map(|trial| {
             let mut pace = Pace::of(&at_own_rate(calibration, trial));
             Some(trial.time_s.iter().find_map(|time_s| pace.take(*time_s))?.of(&trial.name))
@@ -216,7 +218,7 @@ pub fn evaluation_doubts(
         all.extend(paces.chain(fitted).chain(clipped).map(|doubt| doubt.of(name)));
     }
     // The first method is the raw signal.
-    for (method, (name, calibration)) in (1..).zip(calibrations) {
+    for (method, (name, calibration)) in (1..).zip(&named) {
         let errors = &evaluation.pooled[method];
         let mut reach = Reach::of(calibration);
         let signal = calibration.spec().signal.as_str();

@@ -162,10 +162,14 @@ pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usiz
         .or_else(|| if wanted == TIME { guessed() } else { meant() })
 }
 
-/// Returns the note that samples are counted and that a time column, if there is one, is not read.
+/// Returns the note that samples are counted and that a time column, if there is one, is not read. With a rate of 1, the
+/// time is the number of the row.
 pub(crate) fn note_on_rate(column: Option<&str>, rate_hz: f64, by: &str) -> String {
     let time = column
         .map_or("there is no time column".to_owned(), |name| format!("column {name} is not read"));
+    if rate_hz == 1.0 {
+        return format!("{time}: the rows are counted, without a rate per second, {by}");
+    }
     format!("{time}: the time is computed from a rate of {rate_hz} Hz, {by}")
 }
 

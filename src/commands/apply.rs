@@ -68,7 +68,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let gauge = match SleeveCalibration::read(&args.calibration)? {
         SleeveCalibration::One(gauge) => *gauge,
         SleeveCalibration::Many(several) => {
-            let options = args.recorded.options();
+            let options = args.recorded.options_of(&several.spec().provenance);
             anyhow::ensure!(
                 !args.follow_zero,
                 "--follow-zero works with one gauge only; remove it, because several gauges are checked against each other"
@@ -78,7 +78,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     };
     let calibration = gauge.calibration();
     let record_hz = calibration.spec().sample_rate_hz.hz();
-    let options = args.recorded.options().untimed_hz(record_hz);
+    let options = args.recorded.options_of(&calibration.spec().provenance);
+    let options = options.untimed_hz(record_hz);
     let mut options = options.require(calibration.spec().signal.as_str());
     if let Some(pressure) = pressure_column(calibration) {
         options = options.require(pressure);

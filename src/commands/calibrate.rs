@@ -274,6 +274,7 @@ impl Args {
             },
             signal_zero: self.signal_zero,
             rest_length: self.rest_length,
+            time: self.recorded.stored_time(),
             ..base
         }
     }

@@ -81,6 +81,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let of_trials = |error: SleeveError| of_files(error, &args.trials);
     let options = |reference: &str| SleeveOptions {
         rest_length: args.rest_length,
+        time: args.recorded.stored_time(),
         ..SleeveOptions::new(signals.clone(), reference).of(&args.of)
     };
     let one = |reference: &String| make(prior.as_ref(), &trials, options(reference));

@@ -63,7 +63,10 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         several[0].0,
         one[0].0
     );
-    let mut columns = args.recorded.options();
+    let made_on = one.iter().map(|(_, own)| &own.spec().provenance);
+    let made_on = made_on.chain(several.iter().map(|(_, own)| &own.spec().provenance)).next();
+    let recorded = &args.recorded;
+    let mut columns = made_on.map_or_else(|| recorded.options(), |made| recorded.options_of(made));
     let rates = one.iter().map(|(_, own)| own.spec().sample_rate_hz);
     if let Some(rate) = rates.chain(several.iter().map(|(_, own)| own.spec().sample_rate_hz)).next()
     {

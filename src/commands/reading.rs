@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use stretch_core::Provenance;
 use stretch_data::{DataError, DataSet, Split, Trial};
 use stretch_recording::{
     ReadOptions, Recording, RecordingError, TimeColumn, is_format_note, tidy_column,
@@ -57,9 +58,33 @@ impl Recorded {
         }
     }
 
+    /// Returns the time column for a calibration file; empty if a usual one was read.
+    pub(super) fn stored_time(&self) -> String {
+        self.time.stored()
+    }
+
+    /// Returns the reading options for a calibration. Unless a time column is given, it is that of the calibration's
+    /// trials.
+    pub(super) fn options_of(&self, calibrated_on: &Provenance) -> ReadOptions {
+        match calibrated_on.time().parse::<TimeColumn>() {
+            Ok(time)
+                if self.time.stored().is_empty()
+                    && self.rate_hz().is_none()
+                    && !calibrated_on.time().is_empty() =>
+            {
+                self.with_time(&time).or_usual_time()
+            }
+            _ => self.options(),
+        }
+    }
+
     /// Returns the reading options.
     pub(crate) fn options(&self) -> ReadOptions {
-        let options = self.time.options().strict(self.rows.strict);
+        self.with_time(&self.time)
+    }
+
+    fn with_time(&self, time: &TimeColumn) -> ReadOptions {
+        let options = time.options().strict(self.rows.strict);
         match &self.named {
             Some(names) => options.columns(names.iter().map(|name| name.trim())),
             None => options,

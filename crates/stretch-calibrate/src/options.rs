@@ -241,6 +241,8 @@ pub struct Options {
     pub is_table: bool,
     /// Date of the calibration, as free text for the calibration file.
     pub date: String,
+    /// Time column of the trials for the calibration file, such as `stamp:ms`; empty for a usual one.
+    pub time: String,
     /// The effects that a diagnosis named, for [`Memory::Diagnosed`].
     pub causes: Vec<Cause>,
 }
@@ -261,6 +263,7 @@ impl Default for Options {
             dead_band: None,
             is_table: false,
             date: String::new(),
+            time: String::new(),
             causes: Vec::new(),
         }
     }

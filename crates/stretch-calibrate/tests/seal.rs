@@ -276,3 +276,17 @@ fn damage_in_postcard_says_what_to_do() {
     let old = DesignError::Schema { found: 3, newest: 2 }.to_string();
     assert!(old.contains("release 0.1.0 reads"), "{old}");
 }
+
+/// A calibration file in JSON contains the time column of its trials. Files without one can still be read.
+#[test]
+fn the_time_column_of_the_trials_is_stored() {
+    let plain = example_calibration();
+    assert!(!calibration_to_json(&plain).expect("JSON").contains("\"time\""));
+    let mut spec = plain.into_spec();
+    spec.provenance = spec.provenance.with_time("stamp:ms");
+    let calibration = Calibration::new(spec).expect("a calibration");
+    let text = calibration_to_json(&calibration).expect("JSON");
+    let read = calibration_from_json(&text, "cal.json").expect("a calibration");
+    assert_eq!(read.spec().provenance.time(), "stamp:ms");
+    assert_eq!(read, calibration);
+}

@@ -18,6 +18,7 @@ pub struct Provenance {
     trial_count: u32,
     trials: Named<Label>,
     checksums: Named<u32>,
+    time: Label,
 }
 
 /// One item for each named trial.
@@ -56,6 +57,22 @@ impl Provenance {
     /// read from binary form.
     pub fn checksums(&self) -> &[u32] {
         &self.checksums
+    }
+
+    /// Adds the time column of the trials, such as `stamp:ms`; empty for a column with a usual name. Only JSON stores it,
+    /// because a microcontroller reads no files.
+    ///
+    /// ```
+    /// use stretch_core::Provenance;
+    /// assert_eq!(Provenance::new("", ["ramp.csv"]).with_time("stamp:ms").time(), "stamp:ms");
+    /// ```
+    pub fn with_time(self, time: &str) -> Self {
+        Self { time: Label::truncated(time), ..self }
+    }
+
+    /// Returns the time column of the trials. Empty for a usual one, or if the calibration was read from binary form.
+    pub fn time(&self) -> &str {
+        self.time.as_str()
     }
 
     /// Returns the date as given by the caller, cut to `Label::CAPACITY` bytes.
@@ -113,13 +130,19 @@ mod forms {
         trials: Named<Label>,
         #[serde(default, skip_serializing_if = "Named::is_empty")]
         checksums: Named<u32>,
+        #[serde(default, skip_serializing_if = "is_empty")]
+        time: Label,
+    }
+
+    fn is_empty(label: &Label) -> bool {
+        label.as_str().is_empty()
     }
 
     impl Serialize for Provenance {
         fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-            let Self { date, trial_count, trials, checksums } = self.clone();
+            let Self { date, trial_count, trials, checksums, time } = self.clone();
             match serializer.is_human_readable() {
-                true => Text { date, trial_count, trials, checksums }.serialize(serializer),
+                true => Text { date, trial_count, trials, checksums, time }.serialize(serializer),
                 false => Bytes { date, trial_count, trials }.serialize(serializer),
             }
         }
@@ -128,9 +151,9 @@ mod forms {
     impl<'de> Deserialize<'de> for Provenance {
         fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
             if deserializer.is_human_readable() {
-                let Text { date, trial_count, trials, checksums } =
+                let Text { date, trial_count, trials, checksums, time } =
                     Text::deserialize(deserializer)?;
-                return Ok(Self { date, trial_count, trials, checksums });
+                return Ok(Self { date, trial_count, trials, checksums, time });
             }
             let Bytes { date, trial_count, trials } = Bytes::deserialize(deserializer)?;
             Ok(Self { date, trial_count, trials, ..Self::default() })

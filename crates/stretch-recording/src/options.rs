@@ -70,6 +70,19 @@ impl TimeUnit {
         Self::deserialize(StrDeserializer::<serde::de::value::Error>::new(text)).ok()
     }
 
+    /// Returns the abbreviation of the unit: s, ms, us, ns, min, h or d.
+    pub(crate) fn abbreviation(self) -> &'static str {
+        match self {
+            Self::Seconds => "s",
+            Self::Milliseconds => "ms",
+            Self::Microseconds => "us",
+            Self::Nanoseconds => "ns",
+            Self::Minutes => "min",
+            Self::Hours => "h",
+            Self::Days => "d",
+        }
+    }
+
     /// Returns the unit that is the last word of a column's name, in upper or lower case.
     ///
     /// ```
@@ -111,6 +124,8 @@ pub enum DateOrder {
 pub struct ReadOptions {
     pub(crate) time: String,
     pub(crate) time_unit: Option<TimeUnit>,
+    /// Whether a column with a usual name is the time if the column `time` is missing.
+    pub(crate) may_lack_time: bool,
     required: Vec<String>,
     gappy: Vec<String>,
     pub(crate) all_columns: bool,
@@ -132,6 +147,7 @@ impl Default for ReadOptions {
         Self {
             time: TIME.to_owned(),
             time_unit: None,
+            may_lack_time: false,
             required: Vec::new(),
             gappy: Vec::new(),
             all_columns: false,
@@ -170,6 +186,28 @@ impl ReadOptions {
     pub fn time_unit(mut self, unit: TimeUnit) -> Self {
         self.time_unit = Some(unit);
         self
+    }
+
+    /// Takes the time from a column with a usual name in a recording that lacks the column of [`time`](Self::time). The
+    /// unit of [`time_unit`](Self::time_unit) then does not apply.
+    ///
+    /// ```
+    /// use stretch_recording::{ReadOptions, Recording, TimeUnit};
+    /// let options = ReadOptions::new().time("tick").time_unit(TimeUnit::Milliseconds).or_usual_time();
+    /// for text in ["tick,s1\n0,1\n10,2\n", "time_s,s1\n0,1\n0.01,2\n"] {
+    ///     let trial = Recording::from_reader(text.as_bytes(), "a.csv", &options)?.trial;
+    ///     assert_eq!(trial.time_s, [0.0, 0.01]);
+    /// }
+    /// # Ok::<(), stretch_recording::RecordingError>(())
+    /// ```
+    pub fn or_usual_time(mut self) -> Self {
+        self.may_lack_time = true;
+        self
+    }
+
+    /// Returns the unit that the options give for a time column.
+    pub(crate) fn unit_of(&self, column: Option<&str>) -> Option<TimeUnit> {
+        self.time_unit.filter(|_| !self.may_lack_time || column == Some(&self.time))
     }
 
     /// Requires a column. It must be present, and a row in which it is not a finite number cannot be read.
@@ -291,7 +329,7 @@ impl ReadOptions {
 
     /// Returns the counts per second of a time column with this name.
     pub(crate) fn divisor(&self, column: &str) -> f64 {
-        let unit = self.time_unit.or_else(|| TimeUnit::of(column));
+        let unit = self.unit_of(Some(column)).or_else(|| TimeUnit::of(column));
         unit.unwrap_or(TimeUnit::Seconds).per_second()
     }
 }

@@ -1,6 +1,6 @@
 //! The source of a recording's time, from text.
 
-use std::str::FromStr;
+use std::{fmt, str::FromStr};
 
 use crate::options::{DateOrder, ReadOptions, TIME, TimeUnit};
 
@@ -50,7 +50,38 @@ impl FromStr for TimeColumn {
     }
 }
 
+/// The text from which the same source is parsed.
+///
+/// ```
+/// use stretch_recording::TimeColumn;
+/// for text in ["time_s", "stamp:ms", "Datum:dmy", "100hz"] {
+///     assert_eq!(text.parse::<TimeColumn>()?.to_string(), text);
+/// }
+/// # Ok::<(), String>(())
+/// ```
+impl fmt::Display for TimeColumn {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Named(name, None) => f.write_str(name),
+            Self::Named(name, Some(unit)) => write!(f, "{name}:{}", unit.abbreviation()),
+            Self::Dated(name, DateOrder::DayFirst) => write!(f, "{name}:dmy"),
+            Self::Dated(name, DateOrder::MonthFirst) => write!(f, "{name}:mdy"),
+            Self::Rate(rate_hz) => write!(f, "{rate_hz}hz"),
+        }
+    }
+}
+
 impl TimeColumn {
+    /// Returns the text for a calibration file: empty for the default, and for a rate, which a calibration file has
+    /// anyway.
+    pub fn stored(&self) -> String {
+        match self {
+            Self::Named(name, None) if name == TIME => String::new(),
+            Self::Rate(_) => String::new(),
+            _ => self.to_string(),
+        }
+    }
+
     /// Returns the reading options for this source of time.
     pub fn options(&self) -> ReadOptions {
         let options = ReadOptions::new();

@@ -165,12 +165,12 @@ fn rows_and_time() {
     says(
         "time_s,bridge_v\n0.5,1\n0.25,1\n",
         "t.csv, row 3, column time_s: time goes back from 0.5 to 0.25; to replace the time \
-         column by a rate, give --sample-rate HZ",
+         column by a rate, give --time RATEhz",
     );
     says(
         "time_s,bridge_v\n0.5,1\n0.5,1\n",
         "t.csv, row 3, column time_s: time does not advance at 0.5; to replace the time column by \
-         a rate, give --sample-rate HZ",
+         a rate, give --time RATEhz",
     );
 }
 

@@ -241,7 +241,7 @@ fn stale_rows_are_left_out() {
     let again = table("time_s", |i, t| format!("{:.3}", if i < 200 { t } else { t - 4.0 }));
     let error = read_as(&again, &ReadOptions::new()).expect_err("two recordings").to_string();
     assert!(error.contains("row 202, column time_s: time goes back from 3.98 to 0"), "{error}");
-    assert!(error.contains("split the recording") && error.contains("--sample-rate"), "{error}");
+    assert!(error.contains("split the recording") && error.contains("--time RATEhz"), "{error}");
     let strict = ReadOptions::new().strict(true);
     let one = table("time_s", |i, t| format!("{:.3}", if i == 0 { 2.445 } else { t }));
     assert!(read_as(&one, &strict).expect_err("strict").to_string().contains("--strict"));

@@ -89,7 +89,8 @@ pub(crate) fn calibrate_with(
     notes.splice(0..0, prepared.notes.iter().cloned());
     let doubts = prepared.doubts.clone();
     let named = &prepared.options;
-    let provenance = provenance(&named.date, trials, [&named.signal, &named.reference]);
+    let provenance =
+        provenance(&named.date, trials, [&named.signal, &named.reference]).with_time(&named.time);
     let calibration = prepared.calibration(model, provenance)?;
     Ok((Calibrated { calibration, fits, doubts, notes }, made))
 }

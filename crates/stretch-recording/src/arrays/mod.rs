@@ -261,7 +261,7 @@ fn candidate(array: &Array, options: &ReadOptions) -> Option<Candidate> {
     let is_wanted = array.name == wanted || last == wanted;
     let of = match is_wanted {
         true => group.to_owned(),
-        false if wanted == TIME => clock_of(&array.name)?,
+        false if wanted == TIME || options.may_lack_time => clock_of(&array.name)?,
         false => return None,
     };
     let rank = if is_wanted { Some(0) } else { time_rank(last).map(|rank| rank + 1) };

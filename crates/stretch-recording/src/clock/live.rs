@@ -54,7 +54,7 @@ impl LiveClock {
     /// Creates the clock of a time column, or of samples that are counted at `rate_hz`.
     pub(crate) fn new(column: Option<&str>, rate_hz: Option<f64>, options: &ReadOptions) -> Self {
         let named = || TimeUnit::of(column?);
-        let per_second = options.time_unit.or_else(named).map(TimeUnit::per_second);
+        let per_second = options.unit_of(column).or_else(named).map(TimeUnit::per_second);
         Self { per_second, rate_hz, usual_hz: options.untimed_hz, ..Self::default() }
     }
 

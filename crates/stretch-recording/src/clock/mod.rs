@@ -160,6 +160,7 @@ pub(crate) fn time_among(names: &[String], options: &ReadOptions) -> Option<usiz
         .iter()
         .position(|name| name == wanted)
         .or_else(|| if wanted == TIME { guessed() } else { meant() })
+        .or_else(|| if options.may_lack_time { guessed() } else { None })
 }
 
 /// Returns the note that samples are counted and that a time column, if there is one, is not read. With a rate of 1, the
@@ -298,7 +299,7 @@ fn never_rises(file: &str, stamps: &Stamps) -> RecordingError {
 }
 
 fn bad_stamps(at: &Place, problem: &str) -> RecordingError {
-    let problem = format!("{problem}; to replace the time column by a rate, give --sample-rate HZ");
+    let problem = format!("{problem}; to replace the time column by a rate, give --time RATEhz");
     RecordingError::unusable(at, problem)
 }
 

@@ -41,7 +41,9 @@ pub(super) fn decide(
     options: &ReadOptions,
     notes: &mut Vec<String>,
 ) -> Result<f64, RecordingError> {
-    if let Some(known) = stamps.per_second.or(options.time_unit.map(TimeUnit::per_second)) {
+    if let Some(known) =
+        stamps.per_second.or(options.unit_of(Some(&stamps.name)).map(TimeUnit::per_second))
+    {
         return Ok(known);
     }
     let named = TimeUnit::of(&stamps.name);
@@ -123,7 +125,7 @@ pub(super) fn check_rate(
         return Ok(());
     };
     let rate_hz = per_second / steps.sample;
-    let is_said = options.time_unit.is_some() || options.sample_rate_hz.is_some();
+    let is_said = options.unit_of(Some(&stamps.name)).is_some() || options.sample_rate_hz.is_some();
     let usual = if is_said { RATES_HZ } else { USUAL_HZ };
     check_range(file, &stamps.name, rate_hz, usual)
 }
@@ -140,7 +142,7 @@ pub(crate) fn check_range(
     }
     let problem = format!(
         "its time stamps give {rate_hz:.3e} samples per second, which is not between {:e} and {:e}; give their unit with --time {column}:s, :ms, \
-         :us, :ns, :min, :h or :d, or replace them by a rate with --sample-rate HZ",
+         :us, :ns, :min, :h or :d, or replace them by a rate with --time RATEhz",
         range.start(),
         range.end()
     );

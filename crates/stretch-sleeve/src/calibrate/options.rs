@@ -22,6 +22,8 @@ pub struct SleeveOptions {
     pub rest_length: Option<f64>,
     /// Date of the calibration as free text, which is stored with it.
     pub date: String,
+    /// Time column of the trials, which is stored with the calibration, such as `stamp:ms`; empty for a usual one.
+    pub time: String,
 }
 
 impl SleeveOptions {

@@ -93,7 +93,7 @@ pub fn calibrate_array(
         notes.push(TOO_SHORT.into());
     }
     let columns = options.signals.iter().chain([&options.reference]);
-    let provenance = provenance(&options.date, trials, columns);
+    let provenance = provenance(&options.date, trials, columns).with_time(&options.time);
     Ok(SleeveFit {
         calibration: linear.record(Some(&channels), shifts, provenance)?,
         summary: ArraySummary { carried, rmse: held.rmse * unit },

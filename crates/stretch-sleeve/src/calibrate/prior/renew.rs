@@ -131,7 +131,7 @@ impl Prior {
         let variance = self.variance(prior_rmse).unwrap_or(predicted);
         let linear = self.linear(&after.mean, self.gram.clone(), variance);
         let linear = Linear { signals: signals.clone(), ..linear };
-        let provenance = provenance(&options.date, trials, signals);
+        let provenance = provenance(&options.date, trials, signals).with_time(&options.time);
         Ok(SleeveFit {
             calibration: linear.record(Some(&channels), None, provenance)?,
             summary: self.summary(

@@ -98,7 +98,7 @@ impl Prior {
         let [expected_rmse, half_width_95] = self.expect(seconds, known > 0);
         let variance = self.variance(expected_rmse).unwrap_or(predicted);
         let columns = signals.iter().chain([reference]);
-        let provenance = provenance(&options.date, trials, columns);
+        let provenance = provenance(&options.date, trials, columns).with_time(&options.time);
         let linear = Linear {
             signals: signals.clone(),
             reference: reference.clone(),

@@ -206,3 +206,42 @@ fn models_with_memory_start_again_after_a_long_gap() {
         }
     }
 }
+
+/// A baseline is followed at the end at which the sensor rests, whichever it is.
+#[test]
+fn the_baseline_is_followed_at_the_end_where_the_sensor_rests() {
+    let moves = |phase: f64| move |t: f64| (1.1 * t + phase).sin().max(0.0).powi(2);
+    let drifting = |name: &str, phase: f64, drift: f64| {
+        let mut trial = trial(name, 60.0, moves(phase));
+        let bridge_v = &mut trial.channels[1].values;
+        bridge_v.iter_mut().zip(&trial.time_s).for_each(|(v, t)| *v -= drift * t / 60.0);
+        trial
+    };
+    let (fitted, tested) = (drifting("fit", 0.3, 0.02), drifting("test", 1.0, 0.15));
+    let error = |name: &str, reference: &dyn Fn(f64) -> f64, kind: Memory| {
+        let [fitted, tested] = [&fitted, &tested].map(|trial| {
+            let length = trial.require("length_mm").expect("a length");
+            let values = length.iter().map(|x| reference(*x)).collect();
+            let channels = vec![Channel { name: name.into(), values }, trial.channels[1].clone()];
+            Trial { channels, ..trial.clone() }
+        });
+        let options = Options {
+            reference: name.into(),
+            model: ModelKind::Remembering { kind, rest: true },
+            ..Options::default()
+        };
+        let calibration = calibrate(&[fitted], &options).expect("a fit").calibration;
+        evaluate(&[("own", &calibration)], &[tested]).expect("errors").pooled[1].rmse
+    };
+    for kind in [Memory::Observer, Memory::History] {
+        let longest = error("length_mm", &|x| x, kind);
+        for (name, reference) in [
+            ("length_mm", &(|x: f64| 330.0 - x) as &dyn Fn(f64) -> f64),
+            ("angle_deg", &|x| 180.0 - x),
+            ("angle_deg", &|x| x),
+        ] {
+            let other = error(name, reference, kind);
+            assert!(other < 1.3 * longest, "{kind:?}, {name}: {other} against {longest}");
+        }
+    }
+}

@@ -68,7 +68,7 @@ impl Prepared {
         let names: Vec<&str> = trials.iter().map(|trial| trial.name.as_str()).collect();
         let of_trials = doubts(&names, &pieces, sample_rate.hz(), options);
         let doubts = [gaps, of_trials].concat();
-        let target = target(options, &pieces)?;
+        let target = target(options, &pieces, sample_rate.hz())?;
         let pairs = pieces.iter().flat_map(|(_, [signal, reference, _])| {
             signal.iter().zip(reference).map(|(&v, &x)| (v, target.from_reference(x)))
         });
@@ -350,13 +350,43 @@ pub(crate) fn noise_gain(
 /// Index of the trial, and its signal, reference and, if needed, pressure.
 pub(super) type Piece = (usize, [Vec<f64>; 3]);
 
-fn target(options: &Options, pieces: &[Piece]) -> Result<Target, CalibrateError> {
+/// Time over which a reference at rest changes by less than [`STILL`] of its range, s.
+const STILL_S: f64 = 0.2;
+/// Share of the reference's range.
+const STILL: f64 = 0.01;
+/// Share of the reference's range within which a rest is at one of its ends.
+const AT_AN_END: f64 = 0.15;
+/// Smallest duration of the rests from which their end is detected, s.
+const LEAST_REST_S: f64 = 1.0;
+
+/// Whether a reference rests at its greatest value. It does at the end where it rests more than twice as long as at the
+/// other, for a second at least; otherwise where it `usually` does.
+fn rests_at_greatest(pieces: &[Piece], rate_hz: f64, usually: bool) -> bool {
+    let references = || pieces.iter().map(|(_, [_, reference, _])| reference);
+    let seen = extent(references().flatten().copied());
+    let (range, steps) = (seen.max - seen.min, ((STILL_S * rate_hz) as usize).max(1));
+    let rests_s = [seen.min, seen.max].map(|end| {
+        let is_rest = |(from, to): (&f64, &f64)| {
+            (to - from).abs() < STILL * range && (to - end).abs() < AT_AN_END * range
+        };
+        let pairs = references().flat_map(|x| x.iter().zip(x.iter().skip(steps)));
+        pairs.filter(|pair| is_rest(*pair)).count() as f64 / rate_hz
+    });
+    let [own, other] = if usually { [rests_s[1], rests_s[0]] } else { rests_s };
+    usually != (other > LEAST_REST_S && other > 2.0 * own)
+}
+
+fn target(options: &Options, pieces: &[Piece], rate_hz: f64) -> Result<Target, CalibrateError> {
     let all = pieces.iter().flat_map(|(_, [_, reference, _])| reference.iter().copied());
     let longest = all.fold(f64::MIN, f64::max);
-    let rest_length = match options.rest_length {
-        Some(rest_length) => Some(rest_length),
-        None => options.reference.starts_with("length").then_some(longest),
+    let is_length = options.reference.starts_with("length");
+    // A baseline is followed at the low end of the target, so the sensor has to rest there.
+    let follows_rest = matches!(options.model, ModelKind::Remembering { rest: true, .. });
+    let from_longest = match follows_rest {
+        true => rests_at_greatest(pieces, rate_hz, is_length) && (is_length || longest > 0.0),
+        false => is_length,
     };
+    let rest_length = options.rest_length.or(from_longest.then_some(longest));
     Ok(match rest_length {
         Some(rest_length) => {
             DesignError::check("rest_length", rest_length, rest_length > 0.0)?;

@@ -97,6 +97,7 @@ pub fn calibrate_array(
     Ok(SleeveFit {
         calibration: linear.record(Some(&channels), shifts, provenance)?,
         summary: ArraySummary { carried, rmse: held.rmse * unit },
+        doubts: Vec::new(),
         notes,
     })
 }

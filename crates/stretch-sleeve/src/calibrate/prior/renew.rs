@@ -141,6 +141,7 @@ impl Prior {
                 &values,
                 (distance, prior_rmse),
             ),
+            doubts: Vec::new(),
             notes,
         })
     }

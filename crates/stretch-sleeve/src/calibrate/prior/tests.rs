@@ -471,3 +471,30 @@ fn sessions_that_cannot_share_a_prior_are_named_with_what_to_do() {
         "{error}"
     );
 }
+
+/// A recording that is unlike the sessions of the prior is doubted, in its coefficients or in its errors.
+#[test]
+fn a_recording_that_does_not_fit_the_prior_is_doubted() {
+    let prior = prior(&["s1"]);
+    let doubts = |trial: Trial| {
+        let trials = [trial];
+        prior.update(&trials, &SleeveOptions::default()).unwrap().doubts
+    };
+    for wearer in 0..8 {
+        for seconds in [10.0, 30.0] {
+            let found = doubts(session(wearer, 5, seconds));
+            assert!(found.is_empty(), "{wearer}, {seconds} s: {found:?}");
+        }
+    }
+    let changed = |change: &dyn Fn(usize, f64) -> f64| {
+        let mut trial = session(9, 0, 30.0);
+        let values = &mut trial.channels[0].values;
+        values.iter_mut().enumerate().for_each(|(n, v)| *v = change(n, *v));
+        doubts(trial)
+    };
+    let noisy = changed(&|n, v| v + 0.3 * (n as f64 * 0.7).sin() * (n as f64 * 0.031).cos());
+    let shifted = changed(&|_, v| v + 1.0);
+    for found in [noisy, shifted] {
+        assert!(found.len() == 1 && found[0].contains("does not fit the prior"), "{found:?}");
+    }
+}

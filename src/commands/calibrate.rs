@@ -64,7 +64,7 @@ pub(crate) struct Args {
     pub(super) out: PathBuf,
     /// Report with figures to write
     #[arg(long, value_name = "r.html", conflicts_with_all = SLEEVE)]
-    report: Option<PathBuf>,
+    pub(super) report: Option<PathBuf>,
     /// Trials on which the calibration is judged [default: the fitted ones]
     #[arg(long, value_name = "TRIAL.csv", num_args = 1.., conflicts_with_all = SLEEVE)]
     test: Vec<PathBuf>,
@@ -239,13 +239,12 @@ impl Args {
             || self.robust.is_some()
             || self.signal_zero.is_some()
             || self.from.is_some()
-            || self.report.is_some()
             || !self.test.is_empty()
             || self.force;
         ensure!(
             !(is_together && is_of_one),
-            "--signal: several gauges are calibrated together, with a fixed model and without a report: remove --model, --rate, --robust, \
-             --signal-zero, --from, --report, --test and --force, or use --signal auto:s1,s2 for the best of several columns"
+            "--signal: several gauges are calibrated together, with a fixed model: remove --model, --rate, --robust, \
+             --signal-zero, --from, --test and --force, or use --signal auto:s1,s2 for the best of several columns"
         );
         Ok(is_together || self.prior.is_some() || self.session.is_some())
     }

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use serde::Serialize;
-use stretch_calibrate::copied_signals;
+use stretch_calibrate::{CalibrateError, ModelKind, Options, calibrate, copied_signals, evaluate};
 use stretch_data::files::{Outputs, is_standard_output};
 use stretch_data::{Split, Trial, unit_of};
+use stretch_report::{Context, gauges_report};
 use stretch_sleeve::{
     Carried, Prior, Session, SleeveCalibration, SleeveError, SleeveFit, SleeveOptions,
-    UpdateSummary, calibrate_array,
+    UpdateSummary, calibrate_array, evaluate_arrays,
 };
 
 use super::{
@@ -99,6 +100,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
         let record = made.calibration.bytes(path)?;
         outputs.file(path, |out| out.write_all(&record))?;
     }
+    let reports = stage_reports(args, &made, &trials, &mut outputs)?;
     if let Some(path) = &args.session {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let (session, _) =
@@ -111,7 +113,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     };
     args.json.conclude(outputs, &answer, || {
         made.iter().try_for_each(|made| say_first(sentence(made)))?;
-        let written = records.iter().chain(&args.session).map(PathBuf::as_path);
+        let written = records.iter().chain(&reports).chain(&args.session).map(PathBuf::as_path);
         say_below(made.iter().flat_map(blocks), written)
     })
 }
@@ -139,7 +141,59 @@ fn make(
     Ok(Made { calibration, reference, signals, rmse, carried, update, doubts, notes })
 }
 
-/// Returns the path for the calibration file of one of several references: wrist.json becomes
+/// Adds the report of each calibration to the outputs, and returns their paths.
+fn stage_reports(
+    args: &Args,
+    made: &[Made],
+    trials: &[Trial],
+    outputs: &mut Outputs,
+) -> anyhow::Result<Vec<PathBuf>> {
+    let Some(path) = &args.report else { return Ok(Vec::new()) };
+    let path_of = |one: &Made| match made {
+        [_] => path.clone(),
+        _ => record_of(path, &one.reference),
+    };
+    let stage = |one: &Made| {
+        let page = report(one, trials, args.rest_length);
+        let (page, path) = (page.map_err(|error| of_files(error, &args.trials))?, path_of(one));
+        stage_text(outputs, &path, &page)?;
+        Ok(path)
+    };
+    made.iter().map(stage).collect()
+}
+
+/// Returns the report of a calibration: all gauges together, and each gauge with a separate straight line. A gauge to
+/// which no line can be fitted has no part.
+fn report(
+    made: &Made,
+    trials: &[Trial],
+    rest_length: Option<f64>,
+) -> Result<String, CalibrateError> {
+    let together = match &made.calibration {
+        SleeveCalibration::One(one) => evaluate(&[("together", one.calibration())], trials)?,
+        SleeveCalibration::Many(many) => evaluate_arrays(&[("together", &**many)], trials)?,
+    };
+    let line = |signal: &String| {
+        let (signal, reference) = (signal.clone(), made.reference.clone());
+        let model = ModelKind::Linear;
+        let options = Options { signal, reference, model, rest_length, ..Options::default() };
+        let line = calibrate(trials, &options).ok()?;
+        let evaluation = evaluate(&[("linear", &line.calibration)], trials).ok()?;
+        Some((options.signal, line, evaluation))
+    };
+    let lines: Vec<_> = made.signals.iter().filter_map(line).collect();
+    let gauges: Vec<_> =
+        lines.iter().map(|(signal, line, judged)| (signal.as_str(), line, judged)).collect();
+    let context = Context {
+        title: format!("Calibration of {} on {}", made.reference, made.signals.join(", ")),
+        calibrated_on: trials.iter().map(|trial| trial.name.clone()).collect(),
+        notes: made.doubts.iter().chain(&made.notes).cloned().collect(),
+        ..Context::default()
+    };
+    Ok(gauges_report(&together, &gauges, &context))
+}
+
+/// Returns the path for the calibration file or the report of one of several references: wrist.json becomes
 /// wrist.bend_deg.json.
 fn record_of(out: &Path, reference: &str) -> PathBuf {
     match out.extension() {

@@ -130,7 +130,8 @@ pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
     let Judged { calibrated, evaluation, context } = *subject;
     let names = method_names(calibrated, evaluation);
     // pictures come first, because they show what the numbers below mean
-    let is_table = evaluation.trials.iter().all(|trial| are_row_numbers(&trial.time_s));
+    let trials = &evaluation.trials;
+    let is_table = !trials.is_empty() && trials.iter().all(|trial| are_row_numbers(&trial.time_s));
     let liveliest = with_most_motion(&evaluation.trials);
     // The rows of a table have no course over time.
     if !is_table {
@@ -172,17 +173,56 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
         errors_in_words(&two, &evaluation.unit, |_| called(at))
     });
     let Some(errors) = chosen else {
-        return "No estimate could be compared with a reference.".to_owned();
+        return NOT_COMPARED.to_owned();
     };
+    format!("{}, {errors}", judged_on(evaluation, context))
+}
+
+/// The sentence of a report without errors.
+const NOT_COMPARED: &str = "No estimate could be compared with a reference.";
+
+/// Says on which recordings the errors were measured.
+fn judged_on(evaluation: &Evaluation, context: &Context) -> &'static str {
     let judged = &evaluation.trials;
     let seen = judged.iter().filter(|t| context.calibrated_on.contains(&t.trial)).count();
-    let on = match (seen, judged.len()) {
+    match (seen, judged.len()) {
         (0, 1) => "On a recording that was not used for the fit",
         (0, _) => "On recordings that were not used for the fit",
         (seen, all) if seen == all => "On the same recordings as the fit",
         _ => "On recordings of which some were used for the fit",
-    };
-    format!("{on}, {errors}")
+    }
+}
+
+/// The report of several gauges that were calibrated together, as one HTML file: the errors of all gauges together, and
+/// a part for each gauge with a separate straight line. Each gauge has its column, its line and the evaluation of
+/// that line. The first calibration of `together` is that of all gauges.
+pub fn gauges_report(
+    together: &Evaluation,
+    gauges: &[(&str, &Calibrated, &Evaluation)],
+    context: &Context,
+) -> String {
+    let first = together.pooled.iter().find(|errors| errors.method != RAW);
+    let first: Vec<MethodErrors> = first.into_iter().cloned().collect();
+    let errors =
+        errors_in_words(&first, &together.unit, |_| "the calibration of all gauges".to_owned());
+    let verdict = errors.map_or_else(
+        || NOT_COMPARED.to_owned(),
+        |errors| format!("{}, {errors}", judged_on(together, context)),
+    );
+    let mut page = Page::new(&context.title, &verdict);
+    for (signal, ..) in gauges {
+        page.jump(signal, &format!("Go to {signal} alone"));
+    }
+    calibration_sections(&mut page, &Judged { calibrated: &[], evaluation: together, context });
+    // The notes are those of all gauges.
+    let context = &Context { notes: Vec::new(), ..context.clone() };
+    for (signal, line, evaluation) in gauges {
+        let calibrated = &[("linear", *line)];
+        let judged = Judged { calibrated, evaluation, context };
+        page.part(signal, &format!("{signal} alone"), &calibration_verdict(&judged));
+        calibration_sections(&mut page, &judged);
+    }
+    page.finish()
 }
 
 /// States the error of the best method, and that of the raw signal, in one sentence; `None` without a calibration that
@@ -425,6 +465,9 @@ fn remarks(calibrated: &Calibrated) -> impl Iterator<Item = &String> {
 }
 
 fn fits(page: &mut Page, calibrated: &[(&str, &Calibrated)], context: &Context) {
+    if calibrated.is_empty() && context.signal_choice.is_empty() {
+        return;
+    }
     page.section("What was fitted", "");
     if !context.signal_choice.is_empty() {
         page.text(

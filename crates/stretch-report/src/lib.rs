@@ -29,7 +29,7 @@ mod turn_figure;
 
 pub use calibration_page::{
     Context, Judged, calibration_page, calibration_report, calibration_verdict, demo_page,
-    errors_in_words, readme_picture,
+    errors_in_words, gauges_report, readme_picture,
 };
 pub use calibration_tables::{comparison_table, method_table, order_table, signal_table};
 pub use diagnosis_page::diagnosis_page;

@@ -15,6 +15,7 @@ use super::{
     Context, Judged, calibration_page,
     canvas::Ink,
     figure::{Axes, Figure, FigureSize, plot},
+    gauges_report,
     markup::{escape, fixed, number, tick},
     page::{Page, Table},
     readme_picture, thin,
@@ -522,4 +523,50 @@ fn every_probable_answer_has_its_row() {
     let numbers = crate::candidate_numbers_table(&all, &[]);
     assert_eq!([&numbers.rows[0][0], &numbers.rows[0][1]], ["a", "2"]);
     assert!(numbers.rows[0][3].contains("(at the end of its range)"), "{:?}", numbers.rows[0]);
+}
+
+/// Weights and readings without a time have no lag, no course over time and no rates.
+#[test]
+fn a_table_of_weights_is_not_drawn_over_time() {
+    let samples = recording("weights.csv", 1.3, 60);
+    let time_s = (0..60).map(f64::from).collect();
+    let rows = Trial { time_s, ..samples };
+    let options = Options {
+        signal: "gauge".into(),
+        reference: "angle_deg".into(),
+        model: ModelKind::Linear,
+        is_table: true,
+        ..Options::default()
+    };
+    let linear = calibrate(std::slice::from_ref(&rows), &options).unwrap();
+    let evaluation = evaluate(&[("linear", &linear.calibration)], &[rows]).unwrap();
+    assert!(evaluation.pooled.iter().all(|errors| errors.lag_s.is_none()));
+    let context = Context::default();
+    let calibrated = &[("linear", &linear)];
+    let page = calibration_page(&Judged { calibrated, evaluation: &evaluation, context: &context });
+    for absent in
+        ["Estimate and reference over time", "Against the rate", "half-second", "eight seconds"]
+    {
+        assert!(!page.contains(absent), "{absent}");
+    }
+    assert!(page.contains("Signal and reference") && page.contains("Against the reference"));
+}
+
+/// The page of several gauges has a part for each, with the sections of every calibration.
+#[test]
+fn a_page_of_several_gauges_has_a_part_for_each() {
+    let made = Made::on_tuesday();
+    let context =
+        Context { title: "Calibration of angle_deg on s1, s2".into(), ..Context::default() };
+    let gauges = ["s1", "s2"].map(|name| (name, &made.linear, &made.evaluation));
+    let page = gauges_report(&made.evaluation, &gauges, &context);
+    assert!(page.contains("the calibration of all gauges is off by"));
+    for name in ["s1", "s2"] {
+        assert!(
+            page.contains(&format!("<h2>{name} alone</h2>")) && page.contains(&format!("#{name}"))
+        );
+    }
+    assert_eq!(page.matches("<h2>Signal and reference</h2>").count(), 2);
+    assert_eq!(page.matches("<h2>How good it is</h2>").count(), 3);
+    assert_eq!(page.matches("<h2>What was fitted</h2>").count(), 2);
 }

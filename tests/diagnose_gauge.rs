@@ -146,6 +146,9 @@ fn records_that_cannot_be_used_are_refused_by_name() {
     let clipped = spoiled(2, &|i| Some(format!("{:.5}", all[i]?.min(1.5))));
     let doubt = one_line(&warned(&mut run(&clipped, "angle_deg", "s2")));
     assert!(doubt.contains("s2 is at 1.5, its greatest value"), "{doubt}");
+    let text = runs(&mut run(&clipped, "angle_deg", "s2"));
+    let first = text.lines().next().unwrap();
+    assert!(first.contains("the time offset between") && !first.contains("linearity"), "{first}");
     // Exchanged reference and signal are reported, and no effect is named with certainty.
     let doubt = warned(&mut run(&good, "s2", "angle_deg"));
     assert!(doubt.contains("swapped?"), "{doubt}");

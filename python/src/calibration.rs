@@ -8,7 +8,7 @@ use serde::Serialize;
 use stretch_calibrate::{
     CalibrateError, Doubt, FitReport, LiveReceptor, ModelKind, ModelRow, Options, Robust,
     SpellingError, choose_model, evaluation_doubts, explains_little, explains_nothing, parse_rate,
-    pressure_column,
+    pressure_column, without_clipped,
 };
 use stretch_core::{Calibration, Target};
 use stretch_data::{Channel, Trial};
@@ -120,6 +120,8 @@ pub(crate) fn calibrate(
     let trials = trials(&recordings);
     let (mut options, model) = choices.options()?;
     let work = move || -> Result<_, CalibrateError> {
+        let columns = [options.signal.as_str(), options.reference.as_str()];
+        let (trials, left_out) = without_clipped(trials, columns);
         let choice = match model {
             None => Some(choose_model(&trials, &options)?),
             Some(_) => None,
@@ -128,6 +130,7 @@ pub(crate) fn calibrate(
             options.model = choice.model;
         }
         let mut made = stretch_calibrate::calibrate(&trials, &options)?;
+        made.doubts.extend(left_out);
         made.doubts.extend(explains_nothing(&made.fits).or_else(|| explains_little(&made.fits)));
         made.notes.extend(choice.iter().flat_map(|choice| choice.notes.clone()));
         let said = serde_json::to_string(&Made {

@@ -12,7 +12,8 @@ use serde::Deserialize;
 use stretch_calibrate::{
     CalibrateError, Calibrated, Candidate, Evaluation, Memory, ModelChoice, ModelKind, Options,
     Robust, SpellingError, calibrate, choose_model_watched, copied_signals, evaluate_errors,
-    explains_little, explains_nothing, parse_rate, rank_signals, without_gross_errors,
+    explains_little, explains_nothing, parse_rate, rank_signals, without_clipped,
+    without_gross_errors,
 };
 use stretch_core::RateEstimator;
 use stretch_data::files::{Outputs, read_whole};
@@ -405,7 +406,12 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let named = [options.reference.clone(), options.signal.clone()];
     let named = [named[0].as_str(), named[1].as_str()];
     let named = if is_table { &[][..] } else { &named[..] };
-    let (trials, gross_errors) = without_gross_errors(trials, named);
+    let (trials, mut left_out) = without_gross_errors(trials, named);
+    let (trials, clipped) = match named {
+        [reference, signal] => without_clipped(trials, [signal, reference]),
+        _ => (trials, Vec::new()),
+    };
+    left_out.extend(clipped);
     let named = |error: CalibrateError| of_files(error, &args.trials);
     let ranking = rank(&trials, &signal, &args, &options)?;
     if let Some(best) = ranking.first() {
@@ -429,7 +435,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let candidates: Vec<String> = ranking.iter().map(|signal| signal.signal.clone()).collect();
     let line =
         choice.is_none().then(|| worse_than_a_line(&calibrated, &trials, &options)).flatten();
-    let first = line.into_iter().chain(gross_errors).chain(copied_signals(&trials, &candidates));
+    let first = line.into_iter().chain(left_out).chain(copied_signals(&trials, &candidates));
     calibrated.doubts.splice(0..0, first);
     accept(&mut calibrated, &args)?;
     calibrated.notes.extend(causes.notes);

@@ -24,7 +24,7 @@ pub use options::{
     Cause, MODELS_IN_WORDS, Memory, ModelKind, Options, PRESSURE, Robust, SpellingError, SplitBy,
     parse_rate,
 };
-pub use prepare::{MOST_ROWS, Rated, RatedPart, rated, without_gross_errors};
+pub use prepare::{MOST_ROWS, Rated, RatedPart, rated, without_clipped, without_gross_errors};
 pub use record::{
     BoardReceptor, FIXED_STEP, FixedRecord, RecordNumbers, calibration_bytes,
     calibration_from_edited_json, calibration_from_json, calibration_seal, calibration_to_json,

@@ -1,7 +1,7 @@
 //! Each mistake in a trial is reported once, and no other trial is reported.
 
 use stretch_calibrate::{
-    LiveReceptor, ModelKind, Options, Seen, calibrate, evaluate, evaluation_doubts,
+    LiveReceptor, ModelKind, Options, Seen, calibrate, evaluate, evaluation_doubts, without_clipped,
 };
 use stretch_data::{Channel, Trial};
 
@@ -228,5 +228,38 @@ fn a_fault_of_a_test_trial_has_a_doubt_of_its_own() {
         let doubts = evaluation_doubts(&named, &tested, &evaluation);
         assert_eq!(doubts.iter().map(|doubt| doubt.code).collect::<Vec<_>>(), codes, "{doubts:?}");
         assert!(doubts.iter().all(|doubt| doubt.text.contains(says)), "{doubts:?}");
+    }
+}
+
+/// Samples at which the signal is clipped are left out, and the line of the others is that of the sensor.
+#[test]
+fn clipped_samples_are_left_out_at_either_end() {
+    let sound = trial(0);
+    let columns = ["bridge_v", "length_mm"];
+    assert_eq!(without_clipped(vec![sound.clone()], columns), (vec![sound], Vec::new()));
+    let clips: [(Vec<f64>, Spoil); 3] = [
+        (vec![1.9], |t| change(t, SIGNAL, |v| v.min(1.9))),
+        (vec![1.5], |t| change(t, SIGNAL, |v| v.max(1.5))),
+        (vec![1.5, 1.9], |t| change(t, SIGNAL, |v| v.clamp(1.5, 1.9))),
+    ];
+    for (ends, spoil) in clips {
+        let mut clipped = trial(0);
+        spoil(&mut clipped);
+        let values = clipped.require("bridge_v").expect("a signal");
+        let at_ends = values.iter().filter(|v| ends.contains(v)).count();
+        let (kept, sentences) = without_clipped(vec![clipped.clone()], columns);
+        assert_eq!((kept[0].len(), sentences.len()), (clipped.len() - at_ends, ends.len()));
+        let slope = |trial: &Trial| {
+            let [v, x] = columns.map(|name| trial.require(name).expect("a column"));
+            let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+            let [a, b] = [mean(v), mean(x)];
+            let pairs = || v.iter().zip(x).map(|(v, x)| (v - a, x - b));
+            pairs().map(|(v, x)| v * x).sum::<f64>() / pairs().map(|(v, _)| v * v).sum::<f64>()
+        };
+        let [own, before, after] = [&trial(0), &clipped, &kept[0]].map(slope);
+        assert!(
+            (after / own - 1.0).abs() < 0.6 * (before / own - 1.0).abs(),
+            "{own} {before} {after}"
+        );
     }
 }

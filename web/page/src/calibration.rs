@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use stretch_calibrate::{
     CalibrateError, Calibrated, Cause, Judged, ModelChoice, ModelKind, ModelRow, Options,
     calibrate, candidate_models, choose_among, evaluate, evaluation_doubts, explains_little,
-    explains_nothing, judge_model, parse_adc, without_gross_errors,
+    explains_nothing, judge_model, parse_adc, without_clipped, without_gross_errors,
 };
 use stretch_data::{Split, Trial};
 use stretch_export::gauge_header;
@@ -55,7 +55,10 @@ impl Choices {
         if trials.is_empty() {
             return Err(Said("there is no recording to fit: drop one, or choose “fit” for one that is only tested".to_owned()));
         }
-        Ok(without_gross_errors(trials, &[&self.reference, &self.signal]))
+        let (trials, mut left_out) = without_gross_errors(trials, &[&self.reference, &self.signal]);
+        let (trials, clipped) = without_clipped(trials, [&self.signal, &self.reference]);
+        left_out.extend(clipped);
+        Ok((trials, left_out))
     }
 }
 

@@ -7,7 +7,7 @@ use stretch_data::{Trial, in_digits};
 
 use crate::Options;
 
-use super::{series::extent, trials::Piece};
+use super::{gross_errors::rows, series::extent, trials::Piece};
 
 /// Smallest squared correlation of signal and reference at which the line of a trial can be compared with another: the
 /// line then explains at least half of the variance.
@@ -227,13 +227,69 @@ impl Held<'_> {
     }
 }
 
+/// Leaves out the samples in which the signal is stuck at an end of its range while the reference moves further, because
+/// the values beyond that end are lost. Also returns a sentence for each end of each trial.
+///
+/// ```
+/// use stretch_calibrate::without_clipped;
+/// use stretch_data::{Channel, Trial};
+///
+/// let length: Vec<f64> = (0..400).map(|n| 165.0 - 15.0 * (0.05 * f64::from(n)).cos()).collect();
+/// let voltage = length.iter().map(|x| (0.01 * x).min(1.75)).collect();
+/// let channel = |name: &str, values| Channel { name: name.into(), values };
+/// let time_s = (0..400).map(|n| 0.01 * f64::from(n)).collect();
+/// let channels = vec![channel("length_mm", length), channel("bridge_v", voltage)];
+/// let trial = Trial { name: "a.csv".into(), time_s, channels };
+/// let (kept, sentences) = without_clipped(vec![trial], ["bridge_v", "length_mm"]);
+/// assert!(kept[0].channel("bridge_v").is_some_and(|v| v.len() < 300 && v.iter().all(|v| *v < 1.75)));
+/// assert!(sentences[0].contains("of 400 samples of a.csv are left out"), "{}", sentences[0]);
+/// ```
+pub fn without_clipped(
+    trials: Vec<Trial>,
+    [signal, reference]: [&str; 2],
+) -> (Vec<Trial>, Vec<String>) {
+    let mut sentences = Vec::new();
+    let one = |trial: Trial| {
+        let mut kept = trial;
+        let all = kept.len();
+        // There are two ends.
+        for _ in 0..2 {
+            let Some(end) = held(&kept, [signal, reference], |held| held.stands_at()) else {
+                break;
+            };
+            let Ok(values) = kept.require(signal) else { break };
+            let stays: Vec<bool> = values.iter().map(|value| *value != end).collect();
+            let count = stays.iter().filter(|stays| !**stays).count();
+            sentences.push(format!(
+                "{count} of {all} samples of {} are left out, because {signal} stays at {end} while {reference} moves on: the amplifier or the \
+                 converter is probably at its limit, and values beyond it are lost. Lower the gain and record again",
+                kept.name
+            ));
+            kept = rows(&kept, &stays);
+        }
+        kept
+    };
+    let kept = trials.into_iter().map(one).collect();
+    (kept, sentences)
+}
+
 /// Returns a sentence if the signal of a trial is stuck at an end of its range while the reference moves further.
 pub(crate) fn clipped(trial: &Trial, [signal, reference]: [&str; 2]) -> Option<String> {
-    let columns = [signal, reference].map(|name| trial.require(name));
-    let [Ok(signals), Ok(references)] = columns else { return None };
+    held(trial, [signal, reference], |held| held.clipped(signal, reference))
+}
+
+/// Examines the signal and the reference of a whole trial.
+fn held<T>(
+    trial: &Trial,
+    columns: [&str; 2],
+    examine: impl FnOnce(&Held<'_>) -> Option<T>,
+) -> Option<T> {
+    let [Ok(signals), Ok(references)] = columns.map(|name| trial.require(name)) else {
+        return None;
+    };
     let piece = (0, [signals.to_vec(), references.to_vec(), Vec::new()]);
     let line = Line::of(std::iter::once(&piece));
-    Held { name: &trial.name, parts: vec![&piece], line }.clipped(signal, reference)
+    examine(&Held { name: &trial.name, parts: vec![&piece], line })
 }
 
 /// Whether two columns are equal within the digits with which one of them was saved. Two recordings of

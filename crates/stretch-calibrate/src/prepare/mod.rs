@@ -5,6 +5,7 @@ mod gross_errors;
 mod series;
 mod trials;
 
+pub use doubts::without_clipped;
 pub use gross_errors::without_gross_errors;
 pub use series::{Rated, RatedPart, extent, noise, rated, sample_rate_hz};
 pub use trials::{MOST_ROWS, check_rate, even, even_signals, pooled_range, provenance};

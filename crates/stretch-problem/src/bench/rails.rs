@@ -11,23 +11,27 @@ const SHARE: f64 = 0.002;
 /// value at rest.
 const NOISY: f64 = 0.3;
 
-/// A sentence for every end of a column that holds more samples than noise explains; `noise` is that of its recorder.
-pub(crate) fn rails(columns: &Columns, name: &str, noise: f64) -> Vec<String> {
-    let values = columns.all(name);
-    let (low, high) = ends(values);
-    let rail = |(end, which): (f64, &str)| {
-        let count = values.iter().filter(|v| **v == end).count();
+/// Marks the samples at an end of a column as lost, if more are there than noise explains. Adds a doubt for each such end.
+/// `noise` is that of the column's recorder.
+pub(crate) fn leave_out_rails(columns: &mut Columns, name: &str, noise: f64) {
+    let values = columns.all(name).to_vec();
+    let (low, high) = ends(&values);
+    for (end, which) in [(low, "least"), (high, "greatest")] {
+        let is_there = |value: &f64| *value == end;
+        let count = values.iter().filter(|value| is_there(value)).count();
         let share = count as f64 / values.len().max(1) as f64;
-        (share > SHARE && noise_off(values, end) > NOISY * noise).then(|| {
-            format!(
-                "{name} is at {end}{}, its {which} value, in {:.1} % of the samples: the recorder is probably saturated, and all \
-                 values beyond are lost; lower the gain, widen the range or move the zero, and record again",
-                after_number(&unit_of(name)),
-                100.0 * share
-            )
-        })
-    };
-    [(low, "least"), (high, "greatest")].into_iter().filter_map(rail).collect()
+        if share <= SHARE || noise_off(&values, end) <= NOISY * noise {
+            continue;
+        }
+        let marks = columns.is_lost.iter_mut().zip(&values);
+        marks.for_each(|(is_lost, value)| *is_lost |= is_there(value));
+        columns.doubts.push(format!(
+            "{name} is at {end}{}, its {which} value, in {count} samples ({:.1} %), which are left out: the recorder is probably saturated, and all \
+             values beyond are lost; lower the gain, widen the range or move the zero, and record again",
+            after_number(&unit_of(name)),
+            100.0 * share
+        ));
+    }
 }
 
 /// Noise of a channel from its median second difference, without the samples at one value.
@@ -65,13 +69,18 @@ mod tests {
                     channel("bridge_v", bridge_v),
                 ],
             };
-            let session = RigSession::new(&[SessionTrial::new(trial)]).expect("a session");
-            rails(&session.columns, "bridge_v", RigParams::default()[Key::SigmaV])
+            let mut session = RigSession::new(&[SessionTrial::new(trial)]).expect("a session");
+            let columns = &mut session.columns;
+            leave_out_rails(columns, "bridge_v", RigParams::default()[Key::SigmaV]);
+            let lost = columns.is_lost.iter().filter(|is_lost| **is_lost).count();
+            let told = columns.doubts.iter().filter(|doubt| doubt.contains("saturated"));
+            (told.cloned().collect::<Vec<_>>(), lost)
         };
-        assert!(said(at(9.0, 0.01)).is_empty());
-        let clipped = said(at(0.5, 0.01));
+        assert_eq!(said(at(9.0, 0.01)), (Vec::new(), 0));
+        let (clipped, lost) = said(at(0.5, 0.01));
         assert!(clipped.len() == 1 && clipped[0].contains("bridge_v is at 0.5 V, its greatest"));
+        assert!(lost > 300 && clipped[0].contains(&format!("in {lost} samples")), "{lost}");
         // A simulation without noise gives no note.
-        assert!(said(at(0.5, 0.0)).is_empty());
+        assert_eq!(said(at(0.5, 0.0)), (Vec::new(), 0));
     }
 }

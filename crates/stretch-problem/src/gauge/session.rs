@@ -5,7 +5,7 @@ use stretch_data::{SessionTrial, unit};
 use stretch_gap::Noise;
 
 use crate::{
-    bench::{columns::Columns, rails::rails},
+    bench::{columns::Columns, rails::leave_out_rails},
     error::ProblemError,
 };
 
@@ -55,7 +55,8 @@ fn check(columns: &mut Columns) -> Result<(), ProblemError> {
             "exchange them: the reference is the length, the signal is the output of the gauge";
         return Err(ProblemError::value(column, "the two look swapped", hint));
     }
-    let (mut shares, mut notes, mut doubts) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut shares, mut noises) = (Vec::new(), Vec::new());
+    let (mut notes, mut doubts) = (Vec::new(), Vec::new());
     for (name, values) in both() {
         let (low, high) = columns.range(values);
         if high <= low {
@@ -63,7 +64,7 @@ fn check(columns: &mut Columns) -> Result<(), ProblemError> {
         }
         let sd = noise(columns, values).sd();
         shares.push(sd / (high - low));
-        doubts.extend(rails(columns, name, sd));
+        noises.push((name.clone(), sd));
     }
     if shares[0] > 3.0 * shares[1] {
         doubts.push(format!(
@@ -79,6 +80,7 @@ fn check(columns: &mut Columns) -> Result<(), ProblemError> {
         }
     }
     columns.notes.extend(notes);
+    noises.iter().for_each(|(name, sd)| leave_out_rails(columns, name, *sd));
     columns.doubts.extend(doubts);
     Ok(())
 }

@@ -32,7 +32,9 @@ pub use session::RigSession;
 use session::{Inputs, LENGTH, NEEDED, VOLTAGE};
 
 use crate::{
-    bench::{Bench, Place, columns::Columns, rails::rails, read_rig, smooth::MeasuredInput},
+    bench::{
+        Bench, Place, columns::Columns, rails::leave_out_rails, read_rig, smooth::MeasuredInput,
+    },
     error::ProblemError,
 };
 
@@ -99,9 +101,7 @@ impl RigSimulator {
             (LENGTH, noise(Key::SigmaL)),
             (PRESSURE, 1e-3 * noise(Key::SigmaP)),
         ];
-        let saturated = recorders.into_iter().flat_map(|(name, sd)| rails(&columns, name, sd));
-        let saturated: Vec<String> = saturated.collect();
-        columns.doubts.extend(saturated);
+        recorders.into_iter().for_each(|(name, sd)| leave_out_rails(&mut columns, name, sd));
         let noises = Noises::of(&rig.params, &columns);
         let inputs = Inputs::of(&columns, &noises, None, 1e-3 * rig.params[Key::PS]);
         let stage_kinds = match inputs.pressure {

@@ -118,7 +118,7 @@ fn a_simulated_effect_is_named_and_reported() {
     assert!(poly13("sim") > 1.2 * poly13("real") && d["transfer"]["unit"] == "percent_full_scale");
     let (with, real) = (poly13("sim_with_effect"), poly13("real"));
     assert_abs_diff_eq!(with, real, epsilon = TRAINED_APART * real);
-    assert!(text.contains("by where the calibration was trained"), "{text}");
+    assert!(text.contains("after a fit to measured or simulated trials"), "{text}");
     // The result has the same bits for any number of threads.
     let (again, page_again) = (scratch.path("again.json"), scratch.path("again.html"));
     runs(run("1", &again).arg("--report").arg(&page_again));

@@ -183,7 +183,8 @@ struct Particle {
     defects: DefectsMemory<f64>,
 }
 
-/// Rates that leap, and by how much more than others: motions begin and end within a sample.
+/// Share of the rates that change abruptly, because motions begin and end within a sample, and the factor by which these
+/// changes exceed others.
 const LEAPS: f64 = 0.03;
 const LEAP: f64 = 10.0;
 

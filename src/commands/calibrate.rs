@@ -36,11 +36,10 @@ use super::{
 
 /// Fit a calibration to logged trials
 ///
-/// Each trial is a recording (CSV in any dialect, NPY, NPZ) with the
-/// time, the signal and the reference; - is standard input, and a folder with a
-/// dataset.toml means its fit trials. The calibration file that is written
-/// contains everything that `apply` or a board needs: surfaces, ranges, rate
-/// estimator, dead band, domain, and its origin.
+/// Each trial is a recording (CSV in any dialect, NPY, NPZ) with the time, the
+/// signal and the reference; - is standard input. Of a folder with a dataset.toml,
+/// the trials with split = "fit" are used. The calibration file contains everything
+/// that `apply`, `evaluate` and `export` need.
 ///
 /// Examples:
 ///
@@ -112,7 +111,8 @@ pub(crate) struct Args {
     signal_zero: Option<f64>,
     /// Resting length, from which contraction is measured
     ///
-    /// By default it is the largest value of a reference called length...; any other reference is estimated directly.
+    /// By default it is the largest value of a reference called length...; any other reference is estimated directly. With +rest, the
+    /// end at which the reference rests most is detected.
     #[arg(long, value_name = "X", conflicts_with = "prior")]
     pub(super) rest_length: Option<f64>,
     /// Diagnosis whose effects --model diagnosed and auto use
@@ -126,9 +126,9 @@ pub(crate) struct Args {
     /// calibration is the prior. For one gauge, --model auto with 30 s of reference is usually more accurate.
     #[arg(long, value_name = "prior.json")]
     pub(super) prior: Option<PathBuf>,
-    /// Sensor, wearer, activity: left/anna
+    /// What the prior knows of this session: sensor/wearer/activity, such as left/anna
     ///
-    /// As many of these as are known.
+    /// Give as many of these parts as are known.
     #[arg(long, default_value = "", hide_default_value = true, value_name = "PATH")]
     pub(super) of: String,
     /// Session file to write, for stretch sleeve learn

@@ -323,7 +323,7 @@ fn print(sessions: &Sessions, job: &Job, result: &str) -> anyhow::Result<()> {
         }
     }
     say("")?;
-    let tested = format!("On {} that no fit has seen", trials(sessions.test.len()));
+    let tested = format!("On {} that were not used for any fit", trials(sessions.test.len()));
     say(table_of_errors(&tested, &evaluation.pooled, &evaluation.unit))?;
     if is_verbose() {
         say("\nWhy simulation and recording disagree:")?;

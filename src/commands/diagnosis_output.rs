@@ -234,7 +234,7 @@ fn identifiability(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: boo
     let more =
         if is_verbose || others.is_empty() { "" } else { " -v lists the reasons for the others." };
     out.push(format!(
-            "\nOf {} nominal parameters these data determine {known} to a third of their tolerance or better.{more}",
+            "\nThese data determine {known} of {} nominal parameters to a third of their tolerance or better.{more}",
             all.len()
         ));
     for sentence in others.iter().filter(|_| is_verbose) {

@@ -56,8 +56,8 @@ const FAILED_ABOVE: u8 = 3;
 ///   stretch diagnose problem.toml --fix fixed.toml
 ///   stretch predict fixed.toml friday.csv saturday.csv --report predicted.html
 ///
-/// The simulator runs on the measured inputs of each new recording, once with the effects of the fix
-/// and once without, its parameters re-tuned alone. Errors are root mean squares, in the unit of the
+/// The simulator runs on the measured inputs of each new recording, once with the fix, and once
+/// without its effects but with re-tuned parameters. Errors are root mean squares, in the unit of the
 /// output and in multiples of its noise. Columns and rates that leave the fitted ranges are listed,
 /// because the prediction cannot be trusted there.
 ///

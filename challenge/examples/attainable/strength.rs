@@ -108,8 +108,8 @@ impl Strengths {
     }
 }
 
-/// Values of an effect at a share of the way from off to the farther end of its (last) strength.
-/// Shapes are typical and forms usual, where a diagnosis begins, so that no form costs anything.
+/// Values of an effect. Its last strength is set to `share` of the distance between off and the farther end of its range.
+/// Shapes are typical and forms usual, because a diagnosis starts there.
 fn values(effect: &'static Effect, share: f64) -> Vec<f64> {
     let last = effect.parameters.iter().rposition(|p| p.off().is_some());
     let one = |(i, p): (usize, &EffectParameter)| match p.off() {

@@ -110,7 +110,7 @@ impl EffectParameter {
         Self { name, unit, min, max, typical, role, scale: Scale::Linear }
     }
 
-    /// A shape (a scale, a time constant), searched in equal ratios.
+    /// A shape (a scale, a time constant), searched on a logarithmic scale.
     pub const fn shape(
         name: &'static str,
         unit: &'static str,

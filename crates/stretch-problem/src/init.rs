@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use stretch_data::{
-    Quantity, SessionTrial, Trial, ends, in_digits, significant, toml_comment, unit,
+    Quantity, SessionTrial, Trial, ends, in_digits, significant, toml_comment, unit, unit_of,
 };
 use stretch_gap::Noise;
 use stretch_recording::{ReadOptions, Recording};
@@ -173,7 +173,10 @@ fn text(
     out += "\n# Columns, with the least and the greatest value:\n";
     for c in columns.iter().take(LISTED) {
         let kind = if c.is_command() { ", constant at times or named like a command" } else { "" };
-        let unit = unit(&c.name).unwrap_or("its name states no unit");
+        let unit = match unit(&c.name) {
+            Some(_) => unit_of(&c.name),
+            None => "its name states no unit".to_owned(),
+        };
         out += &toml_comment(&format!(
             "  {} ({unit}): {} to {}{kind}",
             c.name, c.range[0], c.range[1]

@@ -68,7 +68,7 @@ pub fn in_words(diagnosis: &Diagnosis) -> Diagnosis {
 pub fn notation<'a>(equations: impl IntoIterator<Item = &'a str>) -> Option<&'static str> {
     let needs = |equation: &str| equation.contains("play(") || equation.contains("mean_rev(");
     equations.into_iter().any(needs).then_some(
-        "In equations y = mean_rev(x, tau) follows x with a time constant, tau dy/dt = x - y; y = play(x, w) stays until x is farther \
-         off than w, then follows at that distance; with {a, b, c} there are three of them, whose mean is taken.",
+        "In equations, y = mean_rev(x, tau) follows x with a time constant, tau dy/dt = x - y; y = play(x, w) stays constant while x is \
+         within w of it, and otherwise follows x at the distance w; {a, b, c} means three such operators, of which the mean is taken.",
     )
 }

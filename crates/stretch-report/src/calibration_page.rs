@@ -274,10 +274,9 @@ fn judged(
         });
     }
     page.text(
-        "Raw is the signal itself, scaled so that its extremes match those of the reference, which no calibration may use. Average \
-         error is the mean absolute error over the range of the \
-         estimate; a positive lag means that the estimate runs behind; outside domain counts \
-         samples whose signal or rate the fit had never seen.",
+        "Raw is the signal itself, scaled so that its extremes match those of the reference, which are not known in use. Average \
+         error is the mean absolute error divided by the range of the estimate. A positive lag means that the estimate is late. Outside \
+         domain counts samples whose signal or rate was outside the range of the fit.",
     );
     page.list(&context.notes);
     let others = evaluation.trials.len();
@@ -295,16 +294,16 @@ fn judged(
         };
         page.folded("Are the differences more than chance?", |page| {
             page.table(&comparison_table(&evaluation.comparisons, &evaluation.unit, called));
-            if is_table {
-                return;
+            if !is_table {
+                page.text(ON_BLOCKS);
             }
-            page.text(
-                "Neighbouring samples resemble each other: P over means of half-second blocks is more reliable than P over samples, \
-                 which is reported as in the paper.",
-            );
         });
     }
 }
+
+/// Remark on the two columns with P values.
+const ON_BLOCKS: &str = "Neighbouring samples have similar errors. Therefore P for means of half-second blocks is more reliable than P for \
+                         samples, which is reported because the paper reports it.";
 
 /// Mean absolute rate of a recording's reference, per second.
 fn travel_per_second(trial: &TrialErrors) -> f64 {
@@ -382,9 +381,9 @@ fn loops(
 }
 
 fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String], is_table: bool) {
-    let intro = "Error is estimate minus reference. Dots are samples from every part of the axis, \
-                 the strong line is the median of all, the band holds four fifths of them; about \
-                 one sample in a hundred lies beyond the frame.";
+    let intro = "Error is estimate minus reference. Dots are samples from every part of the axis. \
+                 The strong line is the median, and the band contains 80 % of the samples. About \
+                 one sample in a hundred lies outside the frame.";
     page.section("Where the errors are", intro);
     let rate = (
         error_figure(evaluation, names, Against::Rate),
@@ -403,18 +402,19 @@ fn shapes(page: &mut Page, calibrated: &[(&str, &Calibrated)], unit: &str) {
         calibrated.iter().filter(|(_, c)| c.calibration.spec().model.has_memory()).collect();
     for (name, calibrated) in &memories {
         page.section(
-            &format!("What it remembers ({name})"),
-            "No surface shows a model that remembers: here is what it makes of a signal that leaps, and of one that goes up \
-             and down evenly through the middle half of its range. Without memory and rate the loops would lie on one line.",
+            &format!("Memory ({name})"),
+            "The estimate of this model depends on earlier samples, which no surface can show. The figures show its estimate after a step \
+             of the signal, and while the signal rises and falls at a constant speed through the middle half of its range. Without memory \
+             and rate, the loops would lie on one line.",
         );
         page.figures(&[
             (
                 step_figure(name, calibrated, unit),
-                "The signal leaps up after 5 s and down after 10 s.".to_owned(),
+                "The signal steps up after 5 s and down after 10 s.".to_owned(),
             ),
             (
                 loop_figure(name, calibrated, unit),
-                "Estimate over signal, by the time of one way up and down.".to_owned(),
+                "Estimate over signal, for several durations of one rise and fall.".to_owned(),
             ),
         ]);
     }
@@ -433,8 +433,9 @@ fn surfaces(page: &mut Page, calibrated: &[(&str, &Calibrated)]) {
         }
         page.heading(&format!("The surfaces ({name})"));
         page.text(
-            "One surface serves rising targets, one falling ones. It is filled where samples support it, drawn as a net where it is \
-             extrapolated, and not drawn where it leaves the frame. The outermost percent of rates is left out.",
+            "One surface is used while the target rises, the other while it falls. A surface is filled where there are samples, drawn as \
+             a net where it is extrapolated, and not drawn where it leaves the frame. The 1 % of the samples with the fastest rates is \
+             left out.",
         );
         let inks = [Ink::Fourth, Ink::Fifth];
         let solid: Vec<_> = views

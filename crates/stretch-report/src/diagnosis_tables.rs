@@ -118,9 +118,9 @@ pub fn candidate_numbers_table(candidates: &[Candidate], stabilities: &[EffectSt
         })
     });
     Table::new(
-        "Numbers of every set, \u{b1} one standard deviation; stability, the share of resampled recordings in which the most probable set \
-         holds the effect",
-        &["Effect", "Set", "Stability", "Numbers"],
+        "Values of every candidate, \u{b1} one standard deviation. Stability: the share of resampled recordings in which the most probable \
+         candidate contains the effect",
+        &["Effect", "Candidate", "Stability", "Values"],
         rows,
     )
 }
@@ -148,7 +148,7 @@ pub fn transfer_table(transfer: &Transfer) -> Table {
         vec![name.to_owned(), number(e.real, 3), number(e.sim, 3), number(e.sim_with_effect, 3)]
     });
     Table::new(
-        "Error on measured test trials, % of full scale, by where the calibration was trained",
+        "Errors of two calibrations on the measured test trials, % of full scale, after a fit to measured or simulated trials",
         &["Calibration", "Measured trials", "Simulated, re-tuned", "Simulated with the effect"],
         rows,
     )

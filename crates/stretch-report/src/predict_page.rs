@@ -28,7 +28,7 @@ pub fn predict_page(prediction: &Prediction) -> String {
     page.list(&prediction.notes);
     page.section(
         "Errors of the prediction",
-        "Root mean square errors on recordings that were not fitted. Without: the simulator with its parameters re-tuned alone. The fix helps if the ratio is below 1.",
+        "Root mean square errors on recordings that were not fitted. Without: the simulator with re-tuned parameters and without the fix. The fix helps if the ratio is below 1.",
     );
     page.table(&predict_table(prediction));
     for trial in &prediction.trials {

@@ -2,8 +2,8 @@
 //!
 //! `stretch-pack PAGE.wasm SOURCES OUT` writes `OUT/index.html` from `SOURCES/index.html`, whose
 //! lines `<!-- style FILE -->`, `<!-- script FILE ... -->`, `<!-- worker FILE ... -->`, `<!-- wasm
-//! -->` and `POLICY` it replaces. The policy names what a browser may run by digests: those of the
-//! page's scripts, and that of the reports' script, because a report opens inside.
+//! -->` and `POLICY` it replaces. The content policy lists the digests of the scripts that a browser
+//! may run: the scripts of the page, and the script of the reports, because the page shows reports.
 
 use std::{env, error::Error, fs, io::Write, path::Path};
 

@@ -104,10 +104,12 @@ impl Identified {
                 )
             }
             Knowledge::Not => {
-                format!("{name} is not determined: {sd:.0} % of its tolerance is left")
+                format!("{name} is not determined: its uncertainty is {sd:.0} % of its tolerance")
             }
             Knowledge::Weakly => {
-                format!("{name} is weakly determined: {sd:.0} % of its tolerance is left")
+                format!(
+                    "{name} is weakly determined: its uncertainty is {sd:.0} % of its tolerance"
+                )
             }
             Knowledge::Determined if !self.at_bound => return None,
             Knowledge::Determined => String::new(),

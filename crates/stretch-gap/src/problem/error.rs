@@ -71,7 +71,7 @@ pub enum GapError {
     Broken(Box<dyn std::error::Error + Send + Sync>),
     /// The probabilities of the hypotheses are not finite.
     #[error(
-        "the probabilities of the hypotheses are not numbers (the re-tuned simulator leaves {retuned:e} times the noise): check the \
+        "the probabilities of the hypotheses are not numbers (the error of the re-tuned simulator is {retuned:e} times the noise): check the \
          noise that is stated; if it is right, this is an error of the program"
     )]
     NoProbability {

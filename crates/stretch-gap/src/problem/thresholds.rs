@@ -6,8 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thresholds {
-    /// Excess, summed over channels, below which there is no gap. The excess of a channel is its
-    /// reduced chi-square minus one.
+    /// Largest sum over the channels of reduced chi-square minus one (the excess) at which there is no gap.
     pub null_excess: f64,
     /// Smallest rise of the score that an added effect must achieve, nats.
     pub rise: f64,

@@ -4,7 +4,7 @@
 //! effects with its alternatives, and every set that was fitted ([`sets`]). Effects are screened
 //! with one simulation per start ([`screen`]); the promising ones are fitted ([`sets`]) and added
 //! if they meet the criteria ([`acceptance`]). Two other explanations are compared ([`variants`]):
-//! commands that switch between rows, and other sizes of the nuisances.
+//! commands that switch between rows, and other sizes of drift and offsets.
 //! Imports: `numerics`, `problem`, `fit`.
 
 pub(crate) mod acceptance;

@@ -178,8 +178,8 @@ pub(crate) fn recorder_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
     let note = |(metric, spec): (&Metric, &StageSpec)| {
         let (times, time_s) = metric.recorder_drift()?;
         Some(format!(
-            "{} has slow noise of {times:.2} times its other noise, with a correlation time of {time_s} s: the diagnosis counts it as noise of the \
-             recorder, and a gap as small and as slow would not be seen",
+            "{} has slow noise with a correlation time of {time_s} s and {times:.2} times the standard deviation of its other noise: it is taken \
+             for noise of the recorder, so a gap as small and as slow would not be found",
             spec.channel
         ))
     };

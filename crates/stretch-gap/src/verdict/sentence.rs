@@ -299,8 +299,8 @@ impl Answer {
                 )
             }
             Self::AtBounds { stage, parameters, left, .. } => format!(
-                "The parameters of {} do not fit within their tolerances: {} are at the end of them, and {left:.1} times the noise is left \
-                 all the same. Is it the right {rig}? If its parameters are right, something is missing that is not in the catalogue.",
+                "The parameters of {} do not fit within their tolerances: {} are at the end of them, and the remaining error is still {left:.1} \
+                 times the noise. Is it the right {rig}? If its parameters are right, something is missing that is not in the catalogue.",
                 of_stage(stage, simulator),
                 parameters.join(", ")
             ),

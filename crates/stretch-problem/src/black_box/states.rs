@@ -35,7 +35,7 @@ impl ProblemSpec {
     /// | --- | --- | --- |
     /// | `state.NAME.spill` | the state cannot rise above v: x = min(x, v) | `greatest` |
     /// | `state.NAME.floor` | it cannot fall below v: x = max(x, v) | `least` |
-    /// | `state.NAME.leak` | it loses v of itself a second: x = x exp(-v dt) | 0 |
+    /// | `state.NAME.leak` | it decays at a rate v, 1/s: x = x exp(-v dt) | 0 |
     ///
     /// Effects that the problem already has stay unchanged, because a fix may hold their values.
     ///

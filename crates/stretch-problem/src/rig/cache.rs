@@ -73,7 +73,7 @@ impl<K: Hash + Eq, V> LastResults<K, V> {
         Self { last: Mutex::new(LruCache::new(most)), most }
     }
 
-    /// The result for a key, made if it is not kept. Two threads that miss a result both make it, and get the same.
+    /// The result for a key, computed if it is not stored. If two threads need the same new result, both compute it.
     pub(crate) fn or_make<E>(
         &self,
         key: K,

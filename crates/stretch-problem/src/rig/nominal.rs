@@ -69,7 +69,7 @@ pub(super) fn parameters(
 }
 
 /// Standard deviation, around 0, of the prior of the settled share in the initial state. A rig that had settled before
-/// the session (share 1) is not implausible.
+/// the session (share 1) is plausible.
 const INITIAL_STATE: f64 = 0.4;
 
 /// The initial hysteresis state of a stage: 0 as if the rig had come from the other end of the

@@ -11,8 +11,8 @@ use crate::{
 };
 
 /// Relative to a tolerance. The preparation makes two fits. The last step of each fit is damped by
-/// a thousandth, so the fit leaves at most a thousandth of the way that it had to go. A way of
-/// three tolerances is reduced to 3e-6 by both together.
+/// a thousandth, so the fit leaves at most a thousandth of the distance to the optimum. Two fits
+/// therefore reduce a distance of three tolerances to 3e-6.
 const DAMPED: f64 = 1e-5;
 /// Relative: a sensitivity is a difference of outputs near 1, which are rounded by 1e-16, divided
 /// by a step of 0.03 tolerances; a tolerance is 0.05.

@@ -46,7 +46,7 @@ fn main() -> anyhow::Result<()> {
             CaseKind::OutOfCatalogue | CaseKind::Struck => verdict.verdict == "unknown",
             _ => label.effects.iter().all(|e| verdict.answer().contains(e)),
         };
-        let named = diagnosis.candidates.iter().find(|c| c.effects == diagnosis.named);
+        let named = diagnosis.candidates.iter().find(|c| c.effects == diagnosis.named());
         let best = named.or(diagnosis.candidates.first());
         let forms: Vec<String> = label
             .acting

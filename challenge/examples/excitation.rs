@@ -46,13 +46,17 @@ fn main() -> anyhow::Result<()> {
             let options = Options { depth: TWO, ..Options::default() };
             let found = source.diagnosed(protocol, options)?;
             let is = |names: &[String]| names.iter().any(|n| n == name);
-            let kind = match (is(&found.named), is(&found.tied), found.tied.is_empty()) {
+            let kind = match (
+                is(&found.named()),
+                is(&found.answer.tied()),
+                found.answer.tied().is_empty(),
+            ) {
                 (true, _, true) => 0,
                 (true, ..) | (_, true, _) => 1,
                 _ => 2,
             };
             count[kind] += 1;
-            let (named, tied, protocol) = (&found.named, &found.tied, protocol.name());
+            let (named, tied, protocol) = (&found.named(), &found.answer.tied(), protocol.name());
             println!("{name} {strength:.2}, {protocol}: {named:?} tied {tied:?}");
         }
     }

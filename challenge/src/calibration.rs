@@ -82,7 +82,7 @@ pub fn calibrated(cases: &[&Case]) -> Thresholds {
 /// not wrong.
 fn is_counted(label: &Label, diagnosis: &Diagnosis) -> bool {
     let shows = label.kind == CaseKind::Null || label.excess >= COUNTED_EXCESS;
-    shows && label.kind != CaseKind::Dominant && diagnosis.verdict != VerdictKind::Record
+    shows && label.kind != CaseKind::Dominant && diagnosis.verdict() != VerdictKind::Record
 }
 
 /// Indices of the candidates that are the truth; empty if it is not listed.

@@ -44,7 +44,7 @@ fn a_check_keeps_its_labels_sealed() {
     assert_eq!(hash.len(), 64);
     fails(&mut challenge(here, &make), 1, "check");
     // what is answered already is left as it is
-    let answer = r#"{"schema":1,"verdict":"no_gap","named":[],"ambiguous":[],"candidates":[],"runtime_s":0.5}"#;
+    let answer = r#"{"schema":2,"verdict":"no_gap","named":[],"ambiguous":[],"candidates":[],"runtime_s":0.5}"#;
     for case in ["case-000", "case-001"] {
         fs::write(check.join(case).join("diagnosis.json"), answer).unwrap();
     }

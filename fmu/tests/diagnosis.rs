@@ -20,7 +20,7 @@ fn diagnosed(source: Arc<dyn Source>) -> Diagnosis {
 fn fmi_2_and_fmi_3_diagnose_as_the_same_equations_in_rust() {
     let problem = Checked::new(spec()).unwrap();
     let in_rust = diagnosed(Arc::new(closure(move |ask: &Ask<'_>| answer(&problem, ask))));
-    assert_eq!(in_rust.named, ["brake"], "{}", in_rust.sentence);
+    assert_eq!(in_rust.named(), ["brake"], "{}", in_rust.sentence);
     for fmi in [2, 3] {
         let Some(built) = servo(fmi, Wrong::Nothing) else { return };
         let problem = Checked::new(spec()).unwrap();

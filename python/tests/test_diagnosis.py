@@ -158,7 +158,7 @@ def test_an_effect_of_the_users_own_is_named_with_its_value(bent):
 def test_what_was_found_is_shown_as_text_table_page_and_code(bent, tmp_path):
     again = stretch_gap.Diagnosis.from_json(bent.to_json())
     assert again.named == bent.named and again.probabilities == bent.probabilities
-    assert json.loads(bent.to_json())["schema"] == 1
+    assert json.loads(bent.to_json())["schema"] == 2
     assert list(bent.to_frame()["effects"])[0] == "bend"
     page = bent.report(tmp_path / "d.html")
     assert page.startswith("<!DOCTYPE html>") and page.count("<svg") > 3
@@ -169,6 +169,13 @@ def test_what_was_found_is_shown_as_text_table_page_and_code(bent, tmp_path):
     found = {}
     exec(bent.fix().code, found)  # what a user would paste
     assert found["parameters"] == bent.parameters and found["bend"] == bent.effects["bend"]
+
+
+def test_another_schema_is_refused(bent):
+    older = json.dumps({**json.loads(bent.to_json()), "schema": 1})
+    with pytest.raises(stretch_gap.StretchError, match="diagnose again"):
+        stretch_gap.Diagnosis.from_json(older)
+    assert len(bent.note_codes) == len(bent.notes)
 
 
 def test_values_have_intervals(bent):

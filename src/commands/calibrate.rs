@@ -327,13 +327,11 @@ impl Args {
     }
 }
 
-/// Newest schema version of a diagnosis that can be read.
-const SCHEMA: u32 = 1;
-
-/// The fields of a diagnosis that are read first.
+/// A diagnosis with the name of its data set.
 #[derive(Deserialize)]
-struct Schema {
-    schema: u32,
+struct Stored {
+    #[serde(flatten)]
+    diagnosis: Diagnosis,
     data_set: Option<String>,
 }
 
@@ -341,16 +339,12 @@ struct Schema {
 fn read_causes(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
     let name = || path.display().to_string();
     let text = String::from_utf8(read_whole(path).with_context(name)?).with_context(name)?;
-    let schema: Schema = serde_json::from_str(&text).with_context(|| {
-        format!("{}: this is not a diagnosis; make one with stretch diagnose --json=d.json", name())
+    let Stored { diagnosis, data_set } = serde_json::from_str(&text).with_context(|| {
+        format!(
+            "{}: this is not a diagnosis of this release; make one with stretch diagnose --json=d.json",
+            name()
+        )
     })?;
-    ensure!(
-        schema.schema <= SCHEMA,
-        "{}: a diagnosis of schema {}, newer than this release reads ({SCHEMA}); use the release that wrote it",
-        name(),
-        schema.schema
-    );
-    let diagnosis: Diagnosis = serde_json::from_str(&text).with_context(name)?;
     let found = causes(&diagnosis);
     if found.is_empty() {
         bail!(
@@ -359,13 +353,12 @@ fn read_causes(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
             diagnosis.sentence
         );
     }
-    let of =
-        schema.data_set.as_ref().map_or(String::new(), |set| format!(", a diagnosis of {set}"));
+    let of = data_set.as_ref().map_or(String::new(), |set| format!(", a diagnosis of {set}"));
     let mut notes =
         vec![format!("the model uses the effects of {}{of}: {}", name(), diagnosis.sentence)];
     // The diagnosis of another rig of the same type may apply, so this is permitted, but a note
     // names both data sets.
-    if let ([own], Some(set)) = (trials, &schema.data_set)
+    if let ([own], Some(set)) = (trials, &data_set)
         && name_of(own) != *set
     {
         notes.push(format!(

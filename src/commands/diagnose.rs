@@ -11,7 +11,7 @@ use anyhow::{Context, ensure};
 use clap::builder::NonEmptyStringValueParser;
 use indicatif::ProgressBar;
 use stretch_data::files::{FileError, Outputs};
-use stretch_gap::{Diagnosis, Options, VerdictKind};
+use stretch_gap::{Answer, Diagnosis, Options, VerdictKind};
 use stretch_problem::{ByTrial, Examined, Problem, Reading, in_words};
 use stretch_recording::TimeColumn;
 use stretch_report::{Subject, diagnosis_page};
@@ -154,17 +154,18 @@ impl FailOn {
     /// Whether a diagnosis matches this option.
     fn covers(self, diagnosis: &Diagnosis) -> bool {
         use VerdictKind::{Effect, NoGap, Parameters, Partial, Record, Unknown};
-        let verdict = diagnosis.verdict;
+        let verdict = diagnosis.verdict();
+        let is_faint = matches!(diagnosis.answer, Answer::Faint { .. });
         match self {
             // A partial answer names an effect, and a part of the gap remains unexplained.
             Self::Effect => matches!(verdict, Effect | Partial),
             Self::Unknown => matches!(verdict, Unknown | Partial),
             Self::Record => verdict == Record,
-            Self::Faint => diagnosis.is_faint(),
+            Self::Faint => is_faint,
             Self::Parameters => verdict == Parameters,
             // A fault that hides a gap is no agreement.
             Self::Gap => !diagnosis.is_agreement(),
-            Self::Any => verdict != NoGap || diagnosis.is_faint() || !diagnosis.is_agreement(),
+            Self::Any => verdict != NoGap || is_faint || !diagnosis.is_agreement(),
         }
     }
 }
@@ -306,7 +307,7 @@ pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
         true => &examined.diagnosis,
         false => &in_words(&examined.diagnosis),
     };
-    diagnosis.reservations.iter().for_each(doubt);
+    diagnosis.reservations().for_each(doubt);
     say_first(&diagnosis.sentence)?;
     if is_quiet() {
         return Ok(());

@@ -7,7 +7,7 @@ use stretch_data::{
     files::{Outputs, write_whole},
     listed,
 };
-use stretch_gap::{Diagnosis, Knowledge, ParameterShift, SliceGap, VerdictKind, Where};
+use stretch_gap::{Answer, Diagnosis, Knowledge, ParameterShift, SliceGap, VerdictKind, Where};
 use stretch_problem::{ByTrial, Examined, Fixed, Implementation, effect_in_words, notation};
 use stretch_report::{
     Table, candidate_numbers_table, candidate_table, difference_table, run_table, stage_table,
@@ -36,10 +36,8 @@ pub(crate) fn text(
     for one in implementations {
         out.push(format!("  {}: {}", named(one, diagnosis), one.words));
     }
-    if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
-        out.push(format!("  proposed effect, on the {}: {}", proposed.acts, proposed.equation));
-    }
-    for gross in &diagnosis.gross {
+    out.extend(diagnosis.proposed_in_words());
+    for gross in diagnosis.answer.gross() {
         out.push(format!("  {}; {}", gross.sentence, gross.hint));
     }
     let rows = diagnosis.rows_used;
@@ -53,8 +51,8 @@ pub(crate) fn text(
     stages(&mut out, diagnosis);
     slices(&mut out, diagnosis);
     candidates(&mut out, diagnosis, is_verbose);
-    if diagnosis.verdict != VerdictKind::NoGap {
-        parameters(&mut out, &diagnosis.parameters, !diagnosis.named.is_empty());
+    if diagnosis.verdict() != VerdictKind::NoGap {
+        parameters(&mut out, &diagnosis.parameters, !diagnosis.named().is_empty());
     }
     identifiability(&mut out, diagnosis, is_verbose);
     implement(&mut out, implementations, diagnosis);
@@ -67,8 +65,8 @@ pub(crate) fn text(
         ));
     }
     // Doubts are printed before the sentence.
-    let reserved = &diagnosis.reservations;
-    let notes: Vec<_> = diagnosis.notes.iter().filter(|note| !reserved.contains(note)).collect();
+    let notes = diagnosis.notes.iter().filter(|note| !note.code.is_reservation());
+    let notes: Vec<_> = notes.collect();
     if !notes.is_empty() {
         out.push("\nNotes:".to_owned());
         out.extend(notes.into_iter().map(|note| format!("- {note}")));
@@ -96,7 +94,7 @@ fn put_table(out: &mut Vec<String>, report: &Table) {
 
 fn stages(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     let Where { stages, end_to_end, .. } = &diagnosis.location;
-    let mut report = stage_table(stages, !diagnosis.named.is_empty());
+    let mut report = stage_table(stages, !diagnosis.named().is_empty());
     report.head.push("Share".to_owned());
     for (row, stage) in report.rows.iter_mut().zip(stages) {
         row.push(percent(stage.share));
@@ -116,8 +114,7 @@ fn stages(out: &mut Vec<String>, diagnosis: &Diagnosis) {
 
 fn slices(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     // If simulator and recording agree, one slice in twenty still deviates by chance.
-    let agrees = matches!(diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
-    if agrees && !diagnosis.is_faint() {
+    if diagnosis.answer.agrees() && !matches!(diagnosis.answer, Answer::Faint { .. }) {
         return;
     }
     let mut loud: Vec<&SliceGap> =
@@ -145,29 +142,14 @@ fn slices(out: &mut Vec<String>, diagnosis: &Diagnosis) {
 
 fn candidates(out: &mut Vec<String>, diagnosis: &Diagnosis, is_verbose: bool) {
     let all = &diagnosis.candidates;
-    if all.is_empty() || diagnosis.verdict == VerdictKind::NoGap {
+    if all.is_empty() || diagnosis.verdict() == VerdictKind::NoGap {
         return;
     }
     put_table(out, &candidate_table(all));
     if is_verbose {
         put_table(out, &candidate_numbers_table(all, &diagnosis.stabilities));
     }
-    // The named effects form one set. Only effects outside the set are rivals; each rival may
-    // replace one of the named effects.
-    let Diagnosis { named, ambiguous, .. } = diagnosis;
-    let rivals: Vec<&String> = ambiguous.iter().filter(|name| !named.contains(name)).collect();
-    match (named.as_slice(), rivals.as_slice()) {
-        (_, []) | ([], [_]) => {}
-        ([], rivals) => out.push(format!(
-            "These data cannot distinguish, with 95 % probability: {}.",
-            listed(rivals)
-        )),
-        (named, rivals) => out.push(format!(
-            "These data cannot tell {} from {} with 95 % probability.",
-            listed(named),
-            listed(rivals)
-        )),
-    }
+    out.extend(diagnosis.rivals_in_words());
 }
 
 /// Lists equation and state of each named effect, for implementing it.
@@ -251,19 +233,10 @@ fn transfer(out: &mut Vec<String>, diagnosis: &Diagnosis) {
 }
 
 fn next(out: &mut Vec<String>, diagnosis: &Diagnosis) {
-    let Some(next) = &diagnosis.next_experiment else { return };
-    if next.separates.is_empty() {
-        out.push(format!("\n{}", next.why));
-        return;
-    }
-    out.push(format!(
-            "\nNext experiment: {} ({:.1} min) would distinguish {}: their predictions differ by {} times the noise. {}",
-            next.name,
-            next.minutes,
-            listed(&next.separates),
-            number(next.d),
-            next.why
-        ));
+    out.extend(diagnosis.next_experiment.iter().map(|next| match next.separates.is_empty() {
+        true => format!("\n{}", next.in_words()),
+        false => format!("\nNext experiment: {}", next.in_words()),
+    }));
 }
 
 /// Prints which runs disagree and in which parameters, unless the program is quiet.

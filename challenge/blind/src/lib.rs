@@ -12,7 +12,7 @@
 //!
 //! // A diagnosis that never sees `sealed/` reads case-000 and answers:
 //! let answer = serde_json::json!({
-//!     "schema": 1, "verdict": "no_gap", "named": [], "ambiguous": [], "candidates": [], "runtime_s": 0.1
+//!     "schema": 2, "verdict": "no_gap", "named": [], "ambiguous": [], "candidates": [], "runtime_s": 0.1
 //! });
 //! let verdict = Verdict::from_diagnosis("case-000", &answer)?;
 //!

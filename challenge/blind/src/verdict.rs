@@ -66,7 +66,7 @@ struct StageShare {
 }
 
 impl Verdict {
-    /// Reads a `diagnosis.json`, schema 1, of a case.
+    /// Reads a `diagnosis.json` of a case.
     ///
     /// The stage is that of the first named effect if the catalogue knows it, otherwise the one
     /// with the largest share of the gap.
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn a_diagnosis_is_read_and_nonsense_refused() {
-        let text = r#"{ "schema": 1, "verdict": "effect", "named": ["leak"],
+        let text = r#"{ "schema": 2, "verdict": "effect", "named": ["leak"],
             "ambiguous": ["leak", "supply_sag"],
             "candidates": [ { "effects": ["leak"], "probability": 0.8, "gap_before": 41.0,
                               "gap_after": 1.4, "closed": 0.96 } ],

@@ -34,7 +34,8 @@ fn without_criteria() -> Thresholds {
 
 fn null(seed: u64, protocol: Protocol) -> anyhow::Result<Null> {
     let source = Source { seed, effect: None };
-    let Diagnosis { gap, verdict, named, .. } = source.diagnosed(protocol, Options::default())?;
+    let Diagnosis { gap, answer, .. } = source.diagnosed(protocol, Options::default())?;
+    let (verdict, named) = (answer.kind(), answer.named());
     let loose = source.diagnosed(
         protocol,
         Options { depth: NonZeroUsize::MIN, thresholds: without_criteria(), ..Options::default() },

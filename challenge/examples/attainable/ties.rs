@@ -50,15 +50,16 @@ impl Said {
 
 /// Whether the true name is alone, tied, or absent.
 fn answer(truth: &str, diagnosis: &Diagnosis) -> String {
-    let Diagnosis { verdict, named, tied, gross, .. } = diagnosis;
+    let answer = &diagnosis.answer;
+    let (named, tied, gross) = (answer.named(), answer.tied(), answer.gross());
     let is_truth = |name: &&String| *name == truth;
-    let all = || named.iter().chain(tied);
+    let all = || named.iter().chain(&tied);
     let others: Vec<&str> = all().filter(|n| !is_truth(n)).map(String::as_str).collect();
     let others = others.join(", ");
     if let Some(error) = gross.first() {
         return format!("record: {:?}", error.what).to_lowercase();
     }
-    match (all().any(|n| is_truth(&n)), others.is_empty(), verdict) {
+    match (all().any(|n| is_truth(&n)), others.is_empty(), answer.kind()) {
         (true, true, _) => "alone".into(),
         (true, false, _) => format!("tied: {others}"),
         (false, false, _) => format!("other: {others}"),

@@ -20,10 +20,14 @@ impl Said {
         let d = &self.diagnosis;
         let shares: Vec<String> =
             d.shares.iter().map(|s| format!("{} {:.2}", s.effect, s.closes)).collect();
-        let gross: Vec<&str> = d.gross.iter().map(|g| g.sentence.as_str()).collect();
+        let gross: Vec<&str> = d.answer.gross().iter().map(|g| g.sentence.as_str()).collect();
         format!(
             "{:?}, named {:?}, tied {:?}, shares {shares:?}, 95 % {:?}, {gross:?}, {:.1} s",
-            d.verdict, d.named, d.tied, d.ambiguous, d.runtime_s
+            d.verdict(),
+            d.named(),
+            d.answer.tied(),
+            d.ambiguous,
+            d.runtime_s
         )
     }
 
@@ -32,8 +36,8 @@ impl Said {
         let d = &self.diagnosis;
         let is = |name: &String| names.contains(&name.as_str());
         [
-            d.named.iter().any(is),
-            d.tied.iter().any(is),
+            d.named().iter().any(is),
+            d.answer.tied().iter().any(is),
             d.ambiguous.iter().any(is),
             d.candidates.first().is_some_and(|c| c.effects.iter().any(is)),
             self.largest().is_some_and(is),
@@ -62,7 +66,7 @@ impl Said {
                 || injection.kin.contains(&name.as_str())
                 || before.diagnosis.ambiguous.contains(name)
         };
-        !self.diagnosis.named.iter().all(is_known)
+        !self.diagnosis.named().iter().all(is_known)
     }
 
     /// Whether the diagnosis noticed that the signal stays at its largest value.
@@ -130,7 +134,7 @@ fn found(names: &[&str], untouched: &[Said], said: &[Said]) -> [String; 5] {
 fn verdicts(said: &[Said]) -> [usize; 5] {
     let mut counts = [0; 5];
     for one in said {
-        counts[match one.diagnosis.verdict {
+        counts[match one.diagnosis.verdict() {
             VerdictKind::Effect => 0,
             VerdictKind::Partial => 1,
             VerdictKind::Unknown => 2,

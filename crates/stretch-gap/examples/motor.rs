@@ -78,6 +78,6 @@ fn main() -> Result<(), GapError> {
     }
     let (diagnosis, _) = diagnose(&motor, &Options::default(), &|_| (), &|| false)?;
     println!("{}", diagnosis.sentence);
-    assert!(["friction", "backlash"].iter().all(|e| diagnosis.named.iter().any(|n| n == e)));
+    assert!(["friction", "backlash"].iter().all(|e| diagnosis.named().iter().any(|n| n == e)));
     Ok(())
 }

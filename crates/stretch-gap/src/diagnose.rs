@@ -32,15 +32,15 @@ use crate::{
         variants::{between_rows, likelier, re_estimated},
     },
     verdict::{
-        answer::{Answer, Findings},
+        answer::Answer,
         coverage::{TooLittle, too_little},
-        diagnosis::{Diagnosis, Unexplained, VerdictKind},
-        judge::{Case, Judged, judge},
-        note::Note,
+        diagnosis::{Diagnosis, SCHEMA, VerdictKind},
+        judge::{Case, judge},
         notes::{
-            answer_notes, dead_parameters_note, detection_limit_note, extrapolation_notes,
-            friction_note, gross_error_notes, implausible_noise_notes, lost_note, not_fitted_note,
-            recorder_notes, retuning_notes, start_notes,
+            answer_notes, budget_note, dead_parameters_note, detection_limit_note,
+            extrapolation_notes, friction_note, gross_error_notes, implausible_noise_notes,
+            kept_parameters_note, lost_note, not_examined_note, not_fitted_note, recorder_notes,
+            retuning_notes, start_notes, starts_note,
         },
     },
 };
@@ -155,9 +155,9 @@ fn concluded(
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let null_band = null_band(cause.problem, task.options.seed)?;
     let gathered = gather(task, cause, null_band)?;
-    let judged = decide(task, cause, &gathered);
-    let proposed = propose_rest(task, cause, &gathered, judged.kind)?;
-    report(task, searched, cause, (gathered, judged, proposed), begun)
+    let answer = decide(task, cause, &gathered);
+    let proposed = propose_rest(task, cause, &gathered, answer.kind())?;
+    report(task, searched, cause, (gathered, answer, proposed), begun)
 }
 
 /// Prepares the problem and re-tunes it from several starts. If commands may switch between rows,
@@ -372,17 +372,20 @@ fn gather(task: Task<'_>, cause: Cause<'_>, null_band: f64) -> Result<Gathered, 
     })
 }
 
-/// Derives the verdict and the named effects from the evidence.
-fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Judged {
+/// Derives the answer from the evidence.
+fn decide(task: Task<'_>, cause: Cause<'_>, gathered: &Gathered) -> Answer {
     let Gathered { evidence, posterior, candidates, shares, sanity, .. } = gathered;
     let case = Case {
-        gap: evidence.gap,
+        simulator: cause.problem.simulator(),
+        evidence,
         posterior,
         candidates,
         shares,
         sanity,
-        is_record: !cause.gross.is_empty(),
+        gross: cause.gross,
+        null_band: gathered.null_band,
         too_little: gathered.too_little,
+        seed: task.options.seed,
     };
     judge(&case, &task.options.thresholds)
 }
@@ -415,12 +418,12 @@ fn propose_rest(
     Ok(found.filter(|p| p.random || p.terms.is_empty() || p.closes_test > 0.0))
 }
 
-/// Assembles the diagnosis: verdict, numbers, notes and summary sentence.
+/// Assembles the diagnosis: answer, numbers, notes and summary sentence.
 fn report(
     task: Task<'_>,
     searched: &Searched<'_>,
     cause: Cause<'_>,
-    (gathered, judged, proposed): (Gathered, Judged, Option<Proposed>),
+    (gathered, answer, proposed): (Gathered, Answer, Option<Proposed>),
     begun: &Stopwatch,
 ) -> Result<(Diagnosis, Evidence), GapError> {
     let (options, thresholds) = (task.options, &task.options.thresholds);
@@ -428,102 +431,69 @@ fn report(
         gathered;
     let Gathered { location, too_little, null_band, .. } = gathered;
     let (simulator, runs) = (cause.problem.simulator(), &cause.problem.compare.runs);
-    let partial = candidates.first().filter(|_| judged.kind == VerdictKind::Partial);
-    let unexplained = partial.map(|first| unexplained(simulator, &evidence, first, options.seed));
-    let is_quiet = matches!(judged.kind, VerdictKind::NoGap | VerdictKind::Parameters);
+    let (kind, is_quiet) = (answer.kind(), answer.agrees());
     let detection_limits = match too_little.is_none() && (is_quiet || options.detection_limits) {
         true => limits(task, searched)?,
         false => Vec::new(),
     };
-    let ambiguous = match is_quiet || judged.kind == VerdictKind::Record {
+    let ambiguous = match is_quiet || kind == VerdictKind::Record {
         true => Vec::new(),
         false => covering_set(&posterior.sets, simulator),
     };
     let (runtime_s, simulations) = (begun.elapsed_s(), runs.count());
     let candidates =
         beside_unknown(candidates, evidence.gap, (posterior.unknown, posterior.function));
-    let answer = Answer::of(
-        Findings {
-            judged: &judged,
-            gap: evidence.gap,
-            candidates: &candidates,
-            shares: &shares,
-            unexplained: unexplained.as_ref(),
-            gross: cause.gross,
-            null_band,
-        },
-        simulator,
-        &evidence,
-    );
-    let naming = judged.naming();
-    let named = answer.effects().iter().map(|effect| effect.name.clone()).collect();
+    let named = answer.named();
     let mut notes = answer_notes(&answer, &sanity, simulator, &evidence);
-    notes.extend(gross_error_notes(cause.problem).into_iter().map(Note::from));
+    notes.extend(gross_error_notes(cause.problem));
     notes.extend(lost_note(runs));
-    let mut reservations: Vec<Note> =
-        implausible_noise_notes(cause.problem, &sanity).into_iter().map(Note::from).collect();
-    if cause.problem.is_held {
-        let held = "the re-tuned parameters could not be simulated over all trials, so the model without effects keeps the last \
-            parameters that could";
-        reservations.push(Note::from(held.to_owned()));
-    }
+    notes.extend(implausible_noise_notes(cause.problem, &sanity));
+    notes.extend(kept_parameters_note(cause.problem));
     let not_examined = searched.lost(&candidates);
-    if !not_examined.is_empty() {
-        let because = "not looked at, because their runs failed: ";
-        reservations.push(Note::default().text(because).effects(&not_examined, ", "));
-    }
-    notes.extend(reservations.iter().cloned());
-    notes.extend(searched.problem.starts.note().map(Note::from));
-    notes.extend(recorder_notes(cause.problem).into_iter().map(Note::from));
+    notes.extend(not_examined_note(&not_examined));
+    notes.extend(starts_note(searched.problem.starts));
+    notes.extend(recorder_notes(cause.problem));
     if evidence.gap.retuned > thresholds.least_gap {
-        let own = start_notes(simulator, &evidence).into_iter();
-        notes.extend(own.chain(retuning_notes(simulator, &evidence)).map(Note::from));
+        notes.extend(start_notes(simulator, &evidence));
+        notes.extend(retuning_notes(simulator, &evidence));
     }
-    notes.extend(extrapolation_notes(simulator, &evidence.roles, &naming.named));
+    notes.extend(extrapolation_notes(simulator, &evidence.roles, &named));
     let model_runs = runs.counted();
-    let spent = model_runs.and_then(|runs| runs.note());
+    let spent = model_runs.and_then(budget_note);
     let cut_short = spent.is_some().then(|| searched.not_looked_at());
     let count = simulator.effects().len().max(1);
     let none_examined = cut_short.as_ref().is_some_and(|cut| cut.len() == count);
-    let is_open = matches!(judged.kind, VerdictKind::Partial | VerdictKind::Unknown);
+    let is_open = matches!(kind, VerdictKind::Partial | VerdictKind::Unknown);
     let is_searched = is_open && task.depth() > 0 && too_little.is_none() && spent.is_none();
     let mut not_fitted = if is_searched { searched.not_looked_at() } else { Vec::new() };
     not_fitted.retain(|name| !not_examined.contains(name));
     notes.extend(not_fitted_note(&not_fitted));
-    notes.extend(friction_note(simulator, &naming.named));
+    notes.extend(friction_note(simulator, &named));
     let identifiability = searched.problem.identified();
     // A rig's parameters are known to act; a program of the user may ignore what it receives.
     let is_program = simulator.model_runs().is_some();
     notes.extend(dead_parameters_note(&identifiability).filter(|_| is_program));
-    notes.extend(spent.map(Note::from));
+    notes.extend(spent);
     let no_name = is_quiet.then(|| detection_limit_note(&detection_limits, simulator.effects()));
     notes.extend(no_name.flatten());
-    let location = Where {
-        stages: with_causes(location.stages, &shares, &naming.named, simulator),
-        ..location
-    };
+    let location =
+        Where { stages: with_causes(location.stages, &shares, &named, simulator), ..location };
     // Runs that only the report page needs do not count as cost of the answer.
     if let (true, Some(stage)) = (options.responses, location.worst()) {
         let responses = responses(cause.problem, &evidence, &cause.found.best, stage);
         evidence.responses = if_possible(responses)?.unwrap_or_default();
     }
     let mut diagnosis = Diagnosis {
-        schema: 1,
-        verdict: judged.kind,
+        schema: SCHEMA,
         gauge_alone: simulator.record().gauge_alone,
-        answer: Some(answer),
+        answer,
         sentence: String::new(),
         not_examined,
         cut_short,
         none_examined,
         not_fitted,
-        tied: naming.tied(),
-        named,
-        faint: naming.faint,
         least_gap: thresholds.least_gap,
-        unexplained,
         proposed,
-        gross: cause.gross.to_vec(),
         ambiguous,
         shares,
         stabilities,
@@ -536,7 +506,6 @@ fn report(
         transfer: None,
         next_experiment: None,
         notes,
-        reservations,
         rows_used: simulator.description().rows_used(),
         simulations,
         model_runs,
@@ -546,32 +515,4 @@ fn report(
     };
     diagnosis.sentence = diagnosis.headline();
     Ok((diagnosis, evidence))
-}
-
-/// Number of slices of the unexplained gap that are reported.
-const REPORTED_SLICES: usize = 3;
-
-/// Returns the share of the gap on the test trials that the first candidate leaves, and the slices
-/// of the trials in which its residual is largest.
-fn unexplained(
-    simulator: &dyn Simulator,
-    evidence: &Evidence,
-    first: &Candidate,
-    seed: u64,
-) -> Unexplained {
-    let stages = evidence.stages.iter().zip(simulator.stages());
-    let worst = stages.max_by(|a, b| a.0.excess_after.total_cmp(&b.0.excess_after));
-    let stage = worst.map_or(String::new(), |(_, spec)| spec.name.clone());
-    let mut loud = localise::slices(simulator, evidence, |s| &s.residual_after, seed);
-    loud.retain(|s| s.stands_out && s.stage == stage);
-    loud.sort_by(|a, b| b.excess.total_cmp(&a.excess));
-    let mut sits: Vec<String> = Vec::new();
-    for slice in loud.iter().take(REPORTED_SLICES) {
-        let axis = format!("{}: ", slice.by);
-        match sits.iter_mut().find(|one| one.starts_with(&axis)) {
-            Some(one) => *one += &format!(", {}", slice.slice),
-            None => sits.push(axis + &slice.slice),
-        }
-    }
-    Unexplained { share: 1.0 - first.closed, stage, sits }
 }

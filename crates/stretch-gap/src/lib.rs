@@ -60,5 +60,5 @@ pub use verdict::{
     diagnosis::{Diagnosis, NextExperiment, Transfer, TransferError, Unexplained, VerdictKind},
     family::EffectFamily,
     next_experiment::{Laboratory, Plan, Proposal, differences, next_experiment},
-    note::Note,
+    note::{Note, NoteCode},
 };

@@ -48,19 +48,19 @@ fn assert_probabilities(told: &Diagnosis) {
 /// Only the verdicts `effect` and `partial` have names. No effect is in two of the lists named, tied and faint. Named
 /// and faint effects belong to the first set.
 fn assert_lists(told: &Diagnosis) {
-    let names = matches!(told.verdict, VerdictKind::Effect | VerdictKind::Partial);
-    assert_eq!(names, !told.named.is_empty(), "{:?} names {:?}", told.verdict, told.named);
-    assert!(names || told.tied.is_empty(), "{told:?}");
+    let names = matches!(told.verdict(), VerdictKind::Effect | VerdictKind::Partial);
+    assert_eq!(names, !told.named().is_empty(), "{:?} names {:?}", told.verdict(), told.named());
+    assert!(names || told.answer.tied().is_empty(), "{told:?}");
     let first = told.candidates.iter().find(|c| !c.effects.is_empty()).expect("`unknown` at least");
-    for name in told.named.iter().chain(&told.faint) {
+    for name in told.named().iter().chain(told.answer.faint()) {
         assert!(first.effects.contains(name), "{name} is not of {:?}", first.effects);
-        assert!(!told.tied.contains(name), "{name} is named and tied with a name");
+        assert!(!told.answer.tied().contains(name), "{name} is named and tied with a name");
     }
-    assert!(told.named.iter().all(|name| !told.faint.contains(name)));
-    let tells = matches!(told.verdict, VerdictKind::Partial | VerdictKind::Unknown);
+    assert!(told.named().iter().all(|name| !told.answer.faint().contains(name)));
+    let tells = matches!(told.verdict(), VerdictKind::Partial | VerdictKind::Unknown);
     assert!(tells || told.proposed.is_none());
-    assert_eq!(told.unexplained.is_some(), told.verdict == VerdictKind::Partial);
-    assert_eq!(!told.gross.is_empty(), told.verdict == VerdictKind::Record);
+    assert_eq!(told.answer.unexplained().is_some(), told.verdict() == VerdictKind::Partial);
+    assert_eq!(!told.answer.gross().is_empty(), told.verdict() == VerdictKind::Record);
     if names {
         assert!(first.is_confirmed && first.closed > 0.0, "{first:?}");
     }
@@ -85,7 +85,7 @@ fn assert_covering(told: &Diagnosis) {
     let ambiguous: BTreeSet<&String> = told.ambiguous.iter().collect();
     assert_eq!(ambiguous, names);
     assert_eq!(ambiguous.len(), told.ambiguous.len(), "a name stands there twice");
-    assert!(told.named.iter().all(|name| told.ambiguous.contains(name)));
+    assert!(told.named().iter().all(|name| told.ambiguous.contains(name)));
 }
 
 /// Shares are between 0 and 1, intervals contain their values, and no number is NaN.
@@ -138,11 +138,19 @@ fn assert_sentence(told: &Diagnosis, measured: &Measured) {
         let is_letter = |c: char| c.is_alphanumeric() || c == '_';
         sentence.split(|c| !is_letter(c)).any(|word| word == name)
     };
-    assert!(told.named.iter().all(|name| says(name)), "{:?}: {sentence}", told.named);
-    assert!(told.tied.iter().all(|name| says(name)), "{:?}: {sentence}", told.tied);
-    if matches!(told.verdict, VerdictKind::Effect | VerdictKind::NoGap | VerdictKind::Parameters) {
-        let listed =
-            |name: &String| [&told.named, &told.tied, &told.faint].iter().any(|l| l.contains(name));
+    assert!(told.named().iter().all(|name| says(name)), "{:?}: {sentence}", told.named());
+    assert!(
+        told.answer.tied().iter().all(|name| says(name)),
+        "{:?}: {sentence}",
+        told.answer.tied()
+    );
+    if matches!(told.verdict(), VerdictKind::Effect | VerdictKind::NoGap | VerdictKind::Parameters)
+    {
+        let listed = |name: &String| {
+            told.named().contains(name)
+                || told.answer.tied().contains(name)
+                || told.answer.faint().contains(name)
+        };
         for effect in &measured.toy.catalogue {
             let name = crate::toys::Toy::name(effect.0, effect.1);
             assert!(listed(&name) || !says(&name), "{name} is in no list: {sentence}");

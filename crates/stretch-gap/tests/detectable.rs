@@ -88,7 +88,7 @@ fn what_is_above_its_limit_is_named_and_what_is_below_is_not() {
         let named = |times: f64| {
             let is_named = |seed: &u64| {
                 let toy = toy.clone().hiding(&[(effect, &[times * strength])]);
-                toy.driven_by(motion.clone(), 40 + seed).diagnosed().0.named == [effect.name()]
+                toy.driven_by(motion.clone(), 40 + seed).diagnosed().0.named() == [effect.name()]
             };
             (0..10).filter(is_named).count()
         };

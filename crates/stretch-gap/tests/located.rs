@@ -166,7 +166,7 @@ fn noise_that_drives_a_stage_is_that_of_the_stage_before() {
 fn the_residual_after_a_named_effect_is_noise() {
     let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(Effect::Cubic, &[0.4])]);
     let (told, evidence) = evidenced(&toy.measured(9), &Options::default());
-    assert_eq!(told.named, ["cubic"]);
+    assert_eq!(told.named(), ["cubic"]);
     let stage = &evidence.stages[0];
     // The mean square of 1000 tested samples has the standard deviation sqrt(2/1000) = 0.045. The tolerance is four of
     // these.

@@ -9,7 +9,7 @@ use testkit::tolerance::{F64_ROUNDING, PLANTED_TERM, RESCALED};
 fn proposed(gauge: &Gauge) -> Proposed {
     let (diagnosis, _) =
         diagnose(gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis");
-    assert_eq!(diagnosis.verdict, VerdictKind::Unknown, "{}", diagnosis.sentence);
+    assert_eq!(diagnosis.verdict(), VerdictKind::Unknown, "{}", diagnosis.sentence);
     let proposed = diagnosis.proposed.expect("an unknown gap is asked what it may be");
     assert!(diagnosis.sentence.contains(&proposed.sentence), "{}", diagnosis.sentence);
     proposed

@@ -14,8 +14,8 @@ fn an_effect_below_noise_taken_too_high_is_named() {
     for seed in 0..3 {
         let found = [1.0, 1.4].map(|times| diagnosed(Lack::Curve, times, seed));
         for found in &found {
-            assert_eq!(found.verdict, VerdictKind::Effect, "{}", found.sentence);
-            assert_eq!(found.named, ["curve"]);
+            assert_eq!(found.verdict(), VerdictKind::Effect, "{}", found.sentence);
+            assert_eq!(found.named(), ["curve"]);
         }
         // The gap is relative to the residual of the best set, so it does not depend on the assumed noise.
         let [right, high] = found.map(|found| found.gap.retuned);
@@ -28,7 +28,7 @@ fn an_effect_below_noise_taken_too_high_is_named() {
 fn nothing_is_named_below_noise_taken_too_high() {
     for seed in 0..20 {
         let found = diagnosed(Lack::Nothing, 1.4, seed);
-        assert!(found.named.is_empty(), "{}", found.sentence);
-        assert!(matches!(found.verdict, VerdictKind::NoGap | VerdictKind::Parameters));
+        assert!(found.named().is_empty(), "{}", found.sentence);
+        assert!(matches!(found.verdict(), VerdictKind::NoGap | VerdictKind::Parameters));
     }
 }

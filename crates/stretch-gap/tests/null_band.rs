@@ -27,7 +27,7 @@ fn noise_stays_within_its_band() {
 fn what_is_above_the_band_and_below_a_name_is_told() {
     for seed in 0..5 {
         let faint = diagnosed(Lack::Whisper, seed);
-        assert_eq!(faint.verdict, VerdictKind::Parameters, "{}", faint.sentence);
+        assert_eq!(faint.verdict(), VerdictKind::Parameters, "{}", faint.sentence);
         assert!(faint.sentence.starts_with("Too faint to name"), "{}", faint.sentence);
     }
 }

@@ -19,9 +19,9 @@ fn exact() -> Toy {
 fn exact_twins_are_a_tie() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Square, Effect::Drift]);
     let told = told(&toy.hiding(&[(Effect::Quadratic, &[0.15])]).measured(1));
-    assert_eq!(told.verdict, VerdictKind::Effect, "{}", told.sentence);
-    assert_eq!((told.named.len(), told.tied.len()), (1, 1), "{told:?}");
-    let mut both = [told.named.clone(), told.tied.clone()].concat();
+    assert_eq!(told.verdict(), VerdictKind::Effect, "{}", told.sentence);
+    assert_eq!((told.named().len(), told.answer.tied().len()), (1, 1), "{told:?}");
+    let mut both = [told.named(), told.answer.tied()].concat();
     both.sort();
     assert_eq!(both, ["quadratic", "square"]);
     assert!(
@@ -44,7 +44,7 @@ fn exact_twins_are_a_tie() {
 fn what_is_told_apart_is_no_tie() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Cubic, Effect::Play]);
     let told = told(&toy.hiding(&[(Effect::Quadratic, &[0.15])]).measured(1));
-    assert_eq!((told.named.as_slice(), told.tied.len()), (&["quadratic".to_owned()][..], 0));
+    assert_eq!((told.named(), told.answer.tied().len()), (vec!["quadratic".to_owned()], 0));
     assert_eq!(told.ambiguous, ["quadratic"]);
     assert!(told.candidates[0].probability > 0.9, "{}", told.candidates[0].probability);
 }
@@ -142,10 +142,10 @@ fn what_closes_nothing_stands_below() {
     let mut toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
     toy = toy.hiding(&[(Effect::Cubic, &[0.5]), (Effect::Drift, &[0.0001])]);
     let told = told(&toy.measured(6));
-    assert!(told.named.contains(&"cubic".to_owned()), "{}", told.sentence);
+    assert!(told.named().contains(&"cubic".to_owned()), "{}", told.sentence);
     let size =
         |name: &String| told.shares.iter().find(|s| s.effect == *name).map(|s| s.closes_excess);
-    for name in &told.named {
+    for name in &told.named() {
         assert!(size(name).is_none_or(|s| s >= told.least_gap), "{name}: {:?}", told.shares);
     }
 }
@@ -177,8 +177,8 @@ fn a_name_grows_with_its_effect() {
         told(&toy.hiding(&[(Effect::Cubic, &[size])]).measured(8))
     };
     let faint = told(0.001);
-    assert!(faint.named.is_empty(), "{}", faint.sentence);
+    assert!(faint.named().is_empty(), "{}", faint.sentence);
     let strong = told(0.3);
-    assert_eq!(strong.named, ["cubic"]);
+    assert_eq!(strong.named(), ["cubic"]);
     assert!(strong.gap.retuned > told(0.1).gap.retuned);
 }

@@ -21,7 +21,7 @@ fn with_offset(seed: u64, law: impl Fn(&[f64]) -> Vec<f64>) -> (Option<Proposed>
     let course = scaled.chunks(SAMPLES).flat_map(law).collect();
     let toy = Toy { courses: vec![(toy.parameter("line.zero"), course)], ..toy };
     let told = told(&toy.measured(seed));
-    (told.proposed, told.verdict)
+    (told.proposed.clone(), told.verdict())
 }
 
 /// Trials of less than 30 s are fitted completely, so signals are scaled by the range over all fitted trials.
@@ -195,7 +195,7 @@ fn what_the_test_trial_alone_has_is_not_proposed() {
         .collect();
     let toy = Toy { courses: vec![(toy.parameter("line.zero"), course)], ..toy };
     let told = told(&toy.measured(6));
-    assert_eq!(told.verdict, VerdictKind::Unknown, "{}", told.sentence);
+    assert_eq!(told.verdict(), VerdictKind::Unknown, "{}", told.sentence);
     assert!(told.proposed.is_none_or(|p| p.terms.is_empty()));
 }
 
@@ -204,5 +204,5 @@ fn what_the_test_trial_alone_has_is_not_proposed() {
 fn a_name_needs_no_proposal() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic]);
     let told = told(&toy.hiding(&[(Effect::Quadratic, &[0.1])]).measured(7));
-    assert_eq!((told.verdict, told.proposed), (VerdictKind::Effect, None));
+    assert_eq!((told.verdict(), told.proposed), (VerdictKind::Effect, None));
 }

@@ -16,7 +16,7 @@ fn stability(told: &Diagnosis, effect: &str) -> f64 {
 fn what_every_trial_shows_is_firm() {
     let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
     let told = told(&toy.hiding(&[(Effect::Play, &[0.1])]).measured(2));
-    assert_eq!(told.named, ["play"], "{}", told.sentence);
+    assert_eq!(told.named(), ["play"], "{}", told.sentence);
     assert!(stability(&told, "play") > 0.99, "{:?}", told.stabilities);
     assert!(told.stabilities.iter().all(|s| (0.0..=1.0).contains(&s.stability)));
 }
@@ -39,7 +39,7 @@ fn of_two_causes_the_stronger_is_the_firmer() {
     let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Cubic, Effect::Drift]);
     let hidden: [(Effect, &[f64]); 2] = [(Effect::Quadratic, &[0.15]), (Effect::Cubic, &[0.3])];
     let told = told(&toy.hiding(&hidden).measured(10));
-    assert_eq!(told.named.len(), 2, "{}", told.sentence);
+    assert_eq!(told.named().len(), 2, "{}", told.sentence);
     assert!(stability(&told, "quadratic") >= stability(&told, "cubic"), "{:?}", told.stabilities);
     assert!(stability(&told, "cubic") > 0.9, "{:?}", told.stabilities);
 }

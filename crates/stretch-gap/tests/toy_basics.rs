@@ -15,8 +15,8 @@ fn a_toy_agrees_with_its_own_bench() {
         let (told, _) = toy.clone().may_lack(&Effect::ALL).measured(1).diagnosed();
         // With a test trial of 1000 samples, noise alone leaves an excess of about sqrt(2/1000), which may exceed the
         // smallest gap that counts.
-        let is_quiet = matches!(told.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
-        assert!(is_quiet && told.named.is_empty(), "{:?}: {}", toy.laws, told.sentence);
+        let is_quiet = matches!(told.verdict(), VerdictKind::NoGap | VerdictKind::Parameters);
+        assert!(is_quiet && told.named().is_empty(), "{:?}: {}", toy.laws, told.sentence);
     }
 }
 
@@ -28,7 +28,7 @@ fn what_a_toy_hides_is_named() {
         for (effect, values) in hidden {
             let toy = toy.clone().may_lack(&Effect::ALL).hiding(&[(effect, values)]);
             let (told, _) = toy.measured(2).diagnosed();
-            assert_eq!(told.named, [effect.name()], "{:?}: {}", toy.laws, told.sentence);
+            assert_eq!(told.named(), [effect.name()], "{:?}: {}", toy.laws, told.sentence);
         }
     }
 }

@@ -47,7 +47,7 @@ fn a_second_time_changes_no_bit_and_another_seed_no_name() {
 }
 
 fn assert_alike(one: &(Diagnosis, Evidence), other: &(Diagnosis, Evidence), relative: f64) {
-    assert_eq!((one.0.verdict, &one.0.named), (other.0.verdict, &other.0.named));
+    assert_eq!((one.0.verdict(), &one.0.named()), (other.0.verdict(), &other.0.named()));
     let gap = |told: &Diagnosis| [told.gap.raw, told.gap.retuned, told.gap.left];
     approx::assert_relative_eq!(
         gap(&one.0)[..],

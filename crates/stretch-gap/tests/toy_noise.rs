@@ -1,9 +1,9 @@
 //! Tests the noise of a channel that is estimated from its recording, and signals that cannot be distinguished from
 //! noise.
 
-use stretch_gap::{Noise, RandomGenerator, VerdictKind, WINDOW, noise_variance};
+use stretch_gap::{Noise, NoteCode, RandomGenerator, VerdictKind, WINDOW, noise_variance};
 
-use crate::toys::{Effect, Law, Toy, slow, texts};
+use crate::toys::{Effect, Law, Toy, noted, slow};
 
 const SAMPLES: usize = 20_000;
 /// Standard errors of a deviation estimated by the median of n squared second differences: the
@@ -148,7 +148,7 @@ fn noise_from_the_record_names_what_stated_noise_names() {
             toy.hidden = hidden.iter().map(|effect| (0, *effect, vec![0.1])).collect();
             let named = [Some(1.0), None].map(|stated| {
                 let toy = Toy { stated, ..toy.clone() };
-                toy.measured(7).diagnosed().0.named
+                toy.measured(7).diagnosed().0.named()
             });
             let expected: Vec<&str> = hidden.iter().map(|e| e.name()).collect();
             assert_eq!(named, [expected.clone(), expected], "{law:?}");
@@ -164,10 +164,10 @@ fn stated_noise_that_is_wrong_names_nothing() {
         let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
         let told = |times| Toy { stated: Some(times), ..toy.clone() }.measured(seed).diagnosed().0;
         let large = told(1.5);
-        assert_eq!(large.verdict, VerdictKind::NoGap, "{}", large.sentence);
+        assert_eq!(large.verdict(), VerdictKind::NoGap, "{}", large.sentence);
         // The excess is 1/0.7^2 - 1 = 1.04: the noise has twice the stated variance.
         let small = told(0.7);
-        assert!(small.named.is_empty(), "{}", small.sentence);
+        assert!(small.named().is_empty(), "{}", small.sentence);
         // With 1000 test samples, a chi-square of 2.04 has a standard deviation of 0.09. The tolerance is three of
         // these.
         approx::assert_abs_diff_eq!(small.gap.retuned, 1.04, epsilon = 0.28);
@@ -222,10 +222,10 @@ fn gross_errors_hide_no_effect() {
                 record.outputs[0][from..from + row].fill(size);
             }
             let told = record.diagnosed().0;
-            assert_eq!(told.named, [Effect::Play.name()], "{}", told.sentence);
+            assert_eq!(told.named(), [Effect::Play.name()], "{}", told.sentence);
             let note =
                 format!("{} of 4000 values of y0 are gross errors and do not count", 2 * row);
-            assert!(texts(&told.notes).contains(&note), "{:?}", told.notes);
+            assert_eq!(noted(&told, NoteCode::GrossErrors), [note]);
         }
     }
 }
@@ -238,10 +238,10 @@ fn noise_that_no_record_has_is_told() {
     let told = |times| Toy { stated: Some(times), ..toy.clone() }.measured(3).diagnosed().0;
     for times in [3.0, 40.0] {
         let far = told(times);
-        assert_eq!(far.verdict, VerdictKind::NoGap);
+        assert_eq!(far.verdict(), VerdictKind::NoGap);
         assert!(!far.is_agreement());
-        assert!(texts(&far.reservations)[0].starts_with("the noise of y0 is implausible, "));
-        assert!(far.notes.contains(&far.reservations[0]));
+        let [note] = &noted(&far, NoteCode::ImplausibleNoise)[..] else { panic!("one note") };
+        assert!(note.starts_with("the noise of y0 is implausible, "));
     }
     assert!(told(1.0).is_agreement() && told(1.5).is_agreement());
 }

@@ -1,9 +1,9 @@
 //! Slow drift and offsets that a simulator describes are no effects, and other effects are still
 //! found.
 
-use stretch_gap::{SlowDrift, VerdictKind};
+use stretch_gap::{NoteCode, SlowDrift, VerdictKind};
 
-use crate::toys::{Effect, Law, Measured, Toy, slow, texts};
+use crate::toys::{Effect, Law, Measured, Toy, noted, slow};
 
 fn drifting(described: SlowDrift, course: (f64, f64), seed: u64) -> Toy {
     let mut toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL);
@@ -23,7 +23,7 @@ fn a_drift_that_is_described_is_no_effect() {
         for seed in 0..5 {
             let told =
                 drifting(DESCRIBED, course, 10 * i as u64 + seed).measured(seed).diagnosed().0;
-            assert!(told.named.is_empty(), "{course:?} {seed}: {}", told.sentence);
+            assert!(told.named().is_empty(), "{course:?} {seed}: {}", told.sentence);
         }
     }
 }
@@ -37,7 +37,7 @@ fn an_effect_beside_a_smaller_drift_is_found() {
     for seed in 0..5 {
         let toy = drifting(described, (0.005, 3.0), seed).hiding(&[(Effect::Quadratic, &[0.4])]);
         let told = toy.measured(seed).diagnosed().0;
-        assert_eq!(told.named, ["quadratic"], "{}", told.sentence);
+        assert_eq!(told.named(), ["quadratic"], "{}", told.sentence);
         let value = told.candidates[0].parameters[0].value;
         // A drift of a twelfth of the effect changes the estimated size by at most a twelfth.
         approx::assert_abs_diff_eq!(value, 0.4, epsilon = 0.4 / 12.0);
@@ -52,7 +52,7 @@ fn a_drift_that_nobody_described_is_a_gap() {
         toy.parameters[1].drift = None;
         let told = toy.measured(seed).diagnosed().0;
         assert!(told.gap.retuned > 1.0, "nine times the noise's variance: {:?}", told.gap);
-        assert_ne!(told.verdict, VerdictKind::NoGap, "{}", told.sentence);
+        assert_ne!(told.verdict(), VerdictKind::NoGap, "{}", told.sentence);
     }
 }
 
@@ -65,9 +65,9 @@ fn offsets_by_trial_are_no_effect_where_they_are_described() {
         let steps = [0.05, -0.03, 0.06, -0.05].into_iter().zip(toy.ranges());
         toy.courses = vec![(3, steps.flat_map(|(step, range)| range.map(move |_| step)).collect())];
         let told = toy.measured(seed).diagnosed().0;
-        assert!(told.named.is_empty(), "{}", told.sentence);
+        assert!(told.named().is_empty(), "{}", told.sentence);
         assert!(
-            matches!(told.verdict, VerdictKind::NoGap | VerdictKind::Parameters),
+            matches!(told.verdict(), VerdictKind::NoGap | VerdictKind::Parameters),
             "{}",
             told.sentence
         );
@@ -90,11 +90,10 @@ fn slow_noise_of_a_recorder_is_no_gap() {
     for (times, correlation_s) in [(0.0, 1.0), (0.4, 1.0), (0.7, 3.0), (0.5, 8.0)] {
         for seed in 0..5 {
             let told = wandering(times, correlation_s, seed, &[]).diagnosed().0;
-            let agrees = matches!(told.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
+            let agrees = matches!(told.verdict(), VerdictKind::NoGap | VerdictKind::Parameters);
             assert!(agrees, "{times} {correlation_s} {seed}: {}", told.sentence);
-            let notes = texts(&told.notes);
-            let is_said = notes.iter().any(|note| note.contains("slow noise"));
-            assert!(is_said == (times > 0.0), "{times} {correlation_s} {seed}: {notes:?}");
+            let is_said = !noted(&told, NoteCode::SlowNoise).is_empty();
+            assert!(is_said == (times > 0.0), "{times} {correlation_s} {seed}: {:?}", told.notes);
         }
     }
 }
@@ -106,7 +105,7 @@ fn what_wanders_by_more_than_noise_stays_a_gap() {
         for seed in 0..5 {
             let told = wandering(times, correlation_s, seed, &[]).diagnosed().0;
             assert!(told.gap.retuned > 1.0, "{times} {correlation_s} {seed}: {:?}", told.gap);
-            let agrees = matches!(told.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
+            let agrees = matches!(told.verdict(), VerdictKind::NoGap | VerdictKind::Parameters);
             assert!(!agrees, "{times} {correlation_s} {seed}: {}", told.sentence);
         }
     }
@@ -117,7 +116,7 @@ fn what_wanders_by_more_than_noise_stays_a_gap() {
 fn an_effect_beside_slow_noise_is_found() {
     for seed in 0..5 {
         let told = wandering(0.6, 3.0, seed, &[(Effect::Quadratic, &[0.05])]).diagnosed().0;
-        assert_eq!(told.named, ["quadratic"], "{seed}: {}", told.sentence);
+        assert_eq!(told.named(), ["quadratic"], "{seed}: {}", told.sentence);
         let value = told.candidates[0].parameters[0].value;
         approx::assert_abs_diff_eq!(value, 0.05, epsilon = 0.01);
     }
@@ -130,11 +129,8 @@ fn a_drift_is_told_as_extrapolated() {
     let notes = |effect: Effect, size: f64| {
         let toy = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).hiding(&[(effect, &[size])]);
         let (told, _) = toy.measured(2).diagnosed();
-        assert_eq!(told.named, [effect.name()], "{}", told.sentence);
-        texts(&told.notes)
-            .into_iter()
-            .filter(|note| note.contains("extrapolated"))
-            .collect::<Vec<_>>()
+        assert_eq!(told.named(), [effect.name()], "{}", told.sentence);
+        noted(&told, NoteCode::ExtrapolatedDrift)
     };
     let [note] = &notes(Effect::Drift, 0.003)[..] else { panic!("one note") };
     let begins = "drift is a law of session time: it was fitted from 0 to 130 s and extrapolated to the test trials, from 180 to 190 s";

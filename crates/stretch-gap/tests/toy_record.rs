@@ -36,9 +36,10 @@ fn distorted(record: Measured, column: &str, error: Distortion) -> Measured {
 /// Returns the reported error of a kind in a column. Errors in other columns may be reported as well, because a wrong
 /// scale of one column is equivalent to one of its neighbour.
 fn found<'a>(told: &'a Diagnosis, what: GrossKind, column: &str) -> &'a Gross {
-    assert_eq!(told.verdict, VerdictKind::Record, "{}", told.sentence);
+    assert_eq!(told.verdict(), VerdictKind::Record, "{}", told.sentence);
     let is_it = |g: &&Gross| g.what == what && g.column.as_deref() == Some(column);
-    told.gross
+    told.answer
+        .gross()
         .iter()
         .find(is_it)
         .unwrap_or_else(|| panic!("{what:?} of {column}: {}", told.sentence))
@@ -53,7 +54,7 @@ fn clean_records_are_told_clean() {
             let toy = Toy { hidden: hidden.clone(), ..chain() };
             let told = told(&toy.off_by(&[1.0, -1.0, 0.5, -0.5]).measured(seed));
             assert!(
-                told.gross.is_empty() && told.verdict != VerdictKind::Record,
+                told.answer.gross().is_empty() && told.verdict() != VerdictKind::Record,
                 "{}",
                 told.sentence
             );
@@ -99,8 +100,8 @@ fn errors_of_the_driving_column_are_told() {
         // An output that is 0.4 s late is equivalent to an input that was recorded 0.4 s early:
         // both are reported.
         let late = told(&toy.hiding(&[(Effect::Late, &[0.4])]).measured(seed));
-        assert_eq!(late.verdict, VerdictKind::Record, "{}", late.sentence);
-        for gross in late.gross.iter().filter(|g| g.what == GrossKind::Delay) {
+        assert_eq!(late.verdict(), VerdictKind::Record, "{}", late.sentence);
+        for gross in late.answer.gross().iter().filter(|g| g.what == GrossKind::Delay) {
             let sign = if gross.column.as_deref() == Some("x") { -1.0 } else { 1.0 };
             // Rate and damping of the oscillator, with tolerances of 3 % and 10 %, absorb a part of the delay.
             approx::assert_abs_diff_eq!(
@@ -109,11 +110,11 @@ fn errors_of_the_driving_column_are_told() {
                 epsilon = 0.03
             );
         }
-        assert_eq!(late.gross[0].what, GrossKind::Delay, "{}", late.sentence);
+        assert_eq!(late.answer.gross()[0].what, GrossKind::Delay, "{}", late.sentence);
         let scaled = with(Distortion { scale: 0.4, ..none });
-        assert_eq!(scaled.verdict, VerdictKind::Record, "{}", scaled.sentence);
+        assert_eq!(scaled.verdict(), VerdictKind::Record, "{}", scaled.sentence);
         let is_factor = |g: &Gross| matches!(g.what, GrossKind::Scale | GrossKind::Parameter);
-        assert!(scaled.gross.iter().all(is_factor), "{}", scaled.sentence);
+        assert!(scaled.answer.gross().iter().all(is_factor), "{}", scaled.sentence);
     }
 }
 
@@ -125,7 +126,7 @@ fn a_copied_column_is_told_with_its_factor() {
     let told = told(&record);
     let copy = found(&told, GrossKind::Copied, "y1");
     approx::assert_relative_eq!(copy.factor.expect("a factor"), 3.0, max_relative = 1e-9);
-    assert!(copy.is_plain() && told.named.is_empty());
+    assert!(copy.is_plain() && told.named().is_empty());
 }
 
 #[test]
@@ -167,9 +168,9 @@ fn swapped_columns_are_given_no_effect() {
         toy.truth[1] = 1.0;
         let record = toy.measured(seed);
         let told = told(&record.rewritten(|x, outputs| std::mem::swap(x, &mut outputs[0])));
-        assert!(told.named.is_empty(), "{}", told.sentence);
+        assert!(told.named().is_empty(), "{}", told.sentence);
         assert!(
-            matches!(told.verdict, VerdictKind::Record | VerdictKind::Unknown),
+            matches!(told.verdict(), VerdictKind::Record | VerdictKind::Unknown),
             "{}",
             told.sentence
         );
@@ -184,8 +185,8 @@ fn a_wrong_number_of_the_rig_file_is_told() {
         // The true value is 0.3 s, and the file states 0.1 +- 0.01 s.
         toy.truth[1] = 0.3;
         let told = told(&toy.measured(seed));
-        assert_eq!(told.verdict, VerdictKind::Record, "{}", told.sentence);
-        let wrong = &told.gross[0];
+        assert_eq!(told.verdict(), VerdictKind::Record, "{}", told.sentence);
+        let wrong = &told.answer.gross()[0];
         assert_eq!(
             (wrong.what, wrong.parameter.as_deref()),
             (GrossKind::Parameter, Some("lag.tau"))

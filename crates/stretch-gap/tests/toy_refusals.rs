@@ -5,9 +5,9 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-use stretch_gap::{Diagnosis, GapError, Options, VerdictKind, diagnose};
+use stretch_gap::{Diagnosis, GapError, NoteCode, Options, VerdictKind, diagnose};
 
-use crate::toys::{Effect, Fails, Law, Measured, Toy, texts};
+use crate::toys::{Effect, Fails, Law, Measured, Toy, noted};
 
 fn refused(record: &Measured) -> GapError {
     diagnose(record, &Options::default(), &|_| (), &|| false).expect_err("it is refused")
@@ -32,8 +32,8 @@ fn an_integrator_that_is_too_coarse_is_refused() {
     // With noise that is a thousand times as large, this change is not visible. With a tenth of the step, the change is
     // a hundredth as large.
     let noisy = Toy { noise: 1.0, ..oscillator(0.025) };
-    assert!(noisy.measured(1).diagnosed().0.named.is_empty());
-    assert!(oscillator(0.0025).measured(1).diagnosed().0.named.is_empty());
+    assert!(noisy.measured(1).diagnosed().0.named().is_empty());
+    assert!(oscillator(0.0025).measured(1).diagnosed().0.named().is_empty());
 }
 
 /// Steps of twice the length are tried first. If they are too long, the simulator's own step is used, and nothing is
@@ -43,7 +43,7 @@ fn an_integrator_that_is_just_fine_enough_is_run_at_its_own_step() {
     let verdicts = [0.025, 0.0125, 0.00625, 0.003125, 0.0015625].map(|step_s| {
         let record = oscillator(step_s).measured(2);
         match diagnose(&record, &Options::default(), &|_| (), &|| false) {
-            Ok((told, _)) => Some(told.named.is_empty()),
+            Ok((told, _)) => Some(told.named().is_empty()),
             Err(GapError::Solver { .. }) => None,
             Err(other) => panic!("{other}"),
         }
@@ -133,28 +133,28 @@ fn an_effect_that_cannot_be_simulated_is_told_and_ends_nothing() {
     };
     let name = Effect::Quadratic.name();
     let is_told = |told: &Diagnosis| {
+        let reserved: Vec<NoteCode> = told.reservations().map(|note| note.code).collect();
         let reservation = format!("not looked at, because their runs failed: {name}");
-        texts(&told.reservations) == [reservation]
-            && told.notes.contains(&told.reservations[0])
+        reserved == [NoteCode::NotExamined]
+            && noted(told, NoteCode::NotExamined) == [reservation]
             && told
                 .sentence
                 .starts_with(&format!("Not looked at, because their runs failed: {name}. "))
-            && texts(&told.notes)
-                .iter()
-                .any(|note| note.contains(&format!(" with {name}; the first: line: ")))
+            && noted(told, NoteCode::FailedRuns)[0]
+                .contains(&format!(" with {name}; the first: line: "))
     };
     // The effect can never be simulated, or (below) not over all four trials.
     let play = toy(Fails::With(Effect::Quadratic, 0), &[(Effect::Play, &[0.1])]);
-    assert_eq!(play.named, [Effect::Play.name()]);
+    assert_eq!(play.named(), [Effect::Play.name()]);
     assert!(is_told(&play), "{} {:?}", play.sentence, play.notes);
     let none = toy(Fails::With(Effect::Quadratic, 0), &[]);
-    assert!(matches!(none.verdict, VerdictKind::NoGap | VerdictKind::Parameters));
+    assert!(matches!(none.verdict(), VerdictKind::NoGap | VerdictKind::Parameters));
     assert!(is_told(&none) && !none.is_agreement(), "{} {:?}", none.sentence, none.notes);
     let tested = toy(Fails::With(Effect::Quadratic, 4), &[(Effect::Quadratic, &[0.1])]);
-    assert!(!tested.named.contains(&name.to_owned()), "{}", tested.sentence);
+    assert!(!tested.named().contains(&name.to_owned()), "{}", tested.sentence);
     assert!(is_told(&tested), "{} {:?}", tested.sentence, tested.notes);
     let sound = Toy::of(&[Law::Line]).may_lack(&Effect::ALL).measured(1).diagnosed().0;
-    assert!(sound.is_agreement() && sound.reservations.is_empty());
+    assert!(sound.is_agreement() && sound.reservations().next().is_none());
 }
 
 /// Number of runs in the largest batch: a creep is screened at two sizes of either sign and three time constants each.
@@ -219,20 +219,18 @@ fn a_budget_that_is_spent_is_told() {
     let (free, needed) = budgeted(Some(usize::MAX));
     let runs = free.model_runs.expect("they are counted");
     assert!(!runs.is_spent && runs.count <= needed);
-    assert_eq!(free.named, ["play"]);
-    assert!(texts(&free.notes).iter().all(|note| !note.contains("budget")), "{:?}", free.notes);
+    assert_eq!(free.named(), ["play"]);
+    assert!(noted(&free, NoteCode::BudgetSpent).is_empty(), "{:?}", free.notes);
     for share in [0.1, 0.3, 0.5] {
         let budget = (share * needed as f64) as usize;
         let (told, made) = budgeted(Some(budget));
         let runs = told.model_runs.expect("they are counted");
         assert!(runs.is_spent && runs.budget == Some(budget), "{runs:?}");
         assert!(told.sentence.starts_with("The budget of runs was spent"), "{}", told.sentence);
+        let note = &noted(&told, NoteCode::BudgetSpent)[0];
         assert!(
-            texts(&told.notes)
-                .iter()
-                .any(|n| n.contains(&format!("the budget of {budget} model runs was spent"))),
-            "{:?}",
-            told.notes
+            note.starts_with(&format!("the budget of {budget} model runs was spent")),
+            "{note}"
         );
         assert!(made < needed, "{made} of {needed}");
     }
@@ -244,7 +242,7 @@ fn a_budget_that_lasts_alters_no_name() {
     let (free, _) = budgeted(None);
     let (counted, _) = budgeted(Some(1_000_000));
     assert_eq!(free.model_runs, None);
-    assert_eq!((&free.named, free.verdict), (&counted.named, counted.verdict));
+    assert_eq!((&free.named(), free.verdict()), (&counted.named(), counted.verdict()));
     // One diagnosis uses steps of twice the length, which makes no difference for a line.
     approx::assert_relative_eq!(
         free.candidates[0].score,

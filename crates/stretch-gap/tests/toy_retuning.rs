@@ -71,7 +71,7 @@ fn intervals_of_effects_cover() {
         let hidden: &[(Effect, &[f64])] = &[(Effect::Quadratic, &[size])];
         let toy = Toy::of(&[Law::Line]).may_lack(&[Effect::Quadratic, Effect::Play]).hiding(hidden);
         let told = told(&toy.measured(seed));
-        assert_eq!(told.named, ["quadratic"], "{}", told.sentence);
+        assert_eq!(told.named(), ["quadratic"], "{}", told.sentence);
         let value = &told.candidates[0].parameters[0];
         let [low, high] = value.interval;
         missed += usize::from(!(low..=high).contains(&size));

@@ -99,5 +99,5 @@ fn a_quick_record_is_not_too_short() {
     let wave = |hertz: f64, t: f64| 0.4 * (std::f64::consts::TAU * hertz * t).sin();
     let x = (0..toy.samples()).map(|i| 0.002 * i as f64).map(|t| wave(5.0, t) + wave(7.3, t + 0.1));
     let (told, _) = toy.driven_by(x.collect(), 1).diagnosed();
-    assert_eq!(told.named, ["play"], "{}", told.sentence);
+    assert_eq!(told.named(), ["play"], "{}", told.sentence);
 }

@@ -1,8 +1,8 @@
 //! Re-tuning begins at several points within the tolerances, before effects are searched.
 
-use stretch_gap::{Options, Starts, Thresholds, VerdictKind};
+use stretch_gap::{NoteCode, Options, Starts, Thresholds, VerdictKind};
 
-use crate::toys::{Effect, Law, Measured, Toy, texts};
+use crate::toys::{Effect, Law, Measured, Toy, noted};
 
 /// A pendulum that is pushed over the top by pulses of `x`.
 fn pendulum(off: &[f64], budget: Option<usize>) -> Measured {
@@ -42,18 +42,16 @@ fn a_pendulum_that_turns_over_is_retuned_and_lacks_nothing() {
         let most = record.outputs[0].iter().fold(0.0_f64, |most, y| most.max(y.abs()));
         assert!(most > 2.0 * std::f64::consts::PI, "it turns over: {most}");
         let (told, _) = record.diagnosed();
-        assert_eq!(told.verdict, VerdictKind::Parameters, "{off:?} {}", told.sentence);
+        assert_eq!(told.verdict(), VerdictKind::Parameters, "{off:?} {}", told.sentence);
         assert!(told.gap.raw > 1000.0 && told.gap.retuned < 0.2, "{:?}", told.gap);
         for (p, truth) in told.parameters.iter().zip(&record.toy.truth) {
             approx::assert_relative_eq!(p.fitted, *truth, max_relative = 0.01);
         }
         let Starts { tried, agreed } = told.starts;
         assert!(agreed < tried, "the first descent ended elsewhere: {agreed} of {tried}");
-        assert!(
-            texts(&told.notes)
-                .iter()
-                .any(|note| note.starts_with("re-tuning ends at different values"))
-        );
+        let [note] = &noted(&told, NoteCode::StartsDisagree)[..] else { panic!("one note") };
+        let begins = format!("re-tuning ends at different values: {agreed} of {tried} starts ");
+        assert!(note.starts_with(&begins), "{note}");
     }
 }
 
@@ -82,10 +80,8 @@ fn other_starts_cost_nothing_without_a_gap_and_little_with_one() {
 #[test]
 fn a_gap_at_the_beginnings_of_trials_is_noted() {
     let mut record = Toy::of(&[Law::Lag]).may_lack(&Effect::ALL).measured(1);
-    let noted = |record: &Measured| {
-        let notes = texts(&record.diagnosed().0.notes);
-        notes.iter().any(|note| note.contains("% of the gap in y0 is in the first tenth"))
-    };
+    let noted =
+        |record: &Measured| !noted(&record.diagnosed().0, NoteCode::InitialState).is_empty();
     assert!(!noted(&record));
     for (i, y) in record.outputs[0].iter_mut().enumerate() {
         *y += 0.5 * (-0.01 * (i % 1000) as f64 / 0.15).exp();

@@ -77,10 +77,9 @@ impl Causes {
 /// The first candidate is used even if the verdict does not name it, because a calibration tests on
 /// held-out trials whether its effects help.
 pub fn causes(diagnosis: &Diagnosis) -> Vec<Cause> {
-    use VerdictKind::{Effect, Partial, Unknown};
     let first: Option<&Candidate> = diagnosis.candidates.first();
-    let Some(first) = first.filter(|_| matches!(diagnosis.verdict, Effect | Partial | Unknown))
-    else {
+    let is_gap = !diagnosis.answer.agrees() && diagnosis.verdict() != VerdictKind::Record;
+    let Some(first) = first.filter(|_| is_gap) else {
         return Vec::new();
     };
     let is_alone = diagnosis.location.stages.len() == 1;

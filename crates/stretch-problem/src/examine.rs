@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 use stretch_data::{RigFile, Trial};
 use stretch_gap::{
-    Diagnosis, EffectValue, Evidence, GapError, Note, Options, diagnose, next_experiment,
+    Diagnosis, EffectValue, Evidence, GapError, Note, NoteCode, Options, diagnose, next_experiment,
 };
 use stretch_sim::{Quantity, Sketch};
 
@@ -68,7 +68,7 @@ impl Problem {
     /// # let (reference, signal, rig, catalogue) = ("rod_mm", "s1", None, &catalogue);
     /// let gauge = GaugeSimulator::new(&GaugeSetup { trials: &trials, reference, signal, rig, catalogue })?;
     /// let examined = Problem::from(gauge).examine(&Options::default(), false, &|_| (), &|| false)?;
-    /// assert_eq!(examined.diagnosis.named, ["channel_skew"]);
+    /// assert_eq!(examined.diagnosis.named(), ["channel_skew"]);
     /// assert_eq!(examined.implementations[0].name, "channel_skew");
     /// assert_eq!(examined.to_json()["seed"], 1);
     /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -86,7 +86,7 @@ impl Problem {
             None => progress(what),
         };
         let (mut diagnosis, evidence) = diagnose(self.simulator(), options, &report, stop)?;
-        if !diagnosis.named.is_empty() {
+        if !diagnosis.named().is_empty() {
             report("computing the calibration error that the gap causes");
             let simulations = AtomicUsize::new(0);
             let asked = (options.seed, &simulations);
@@ -109,12 +109,13 @@ impl Problem {
             };
         }
         diagnosis.set_next_experiment(proposal.as_ref().map(|p| p.next.clone()));
-        let of = |sentences: Vec<String>| sentences.into_iter().map(Note::from);
-        let doubts: Vec<Note> = of(source.doubts()).collect();
+        let of = |code, sentences: Vec<String>| {
+            sentences.into_iter().map(move |text| Note::new(code, text))
+        };
+        let doubts = of(NoteCode::Doubt, source.doubts());
         let notes = &mut diagnosis.notes;
-        notes.splice(0..0, doubts.iter().cloned().chain(of(source.notes())));
-        notes.extend(of(source.afterwards()));
-        diagnosis.reservations.splice(0..0, doubts);
+        notes.splice(0..0, doubts.chain(of(NoteCode::Recording, source.notes())));
+        notes.extend(of(NoteCode::Simulator, source.afterwards()));
         Ok(Examined {
             name: self.name.clone(),
             seed: options.seed,

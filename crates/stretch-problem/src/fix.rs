@@ -87,9 +87,10 @@ impl<'a> Chosen<'a> {
     /// Selects the first candidate if effects are named, or the re-tuned nominal model if no effect
     /// is missing.
     pub(crate) fn of(diagnosis: &'a Diagnosis, evidence: &'a Evidence) -> Result<Self, NoFix> {
-        match diagnosis.verdict {
+        match diagnosis.verdict() {
             VerdictKind::Record => {
-                let hints = diagnosis.gross.iter().map(|g| format!("{} {}", g.sentence, g.hint));
+                let hints =
+                    diagnosis.answer.gross().iter().map(|g| format!("{} {}", g.sentence, g.hint));
                 Err(NoFix::Record { hint: hints.take(1).collect() })
             }
             VerdictKind::Unknown => Err(NoFix::Unknown),
@@ -124,7 +125,7 @@ impl<'a> Chosen<'a> {
     /// Effects that the diagnosis names, in the order of the diagnosis.
     pub(crate) fn named(&self, catalogue: &'a [EffectSpec]) -> Vec<(usize, &'a [f64])> {
         let place = |index: usize| {
-            self.diagnosis.named.iter().position(|name| *name == catalogue[index].name)
+            self.diagnosis.named().iter().position(|name| *name == catalogue[index].name)
         };
         let named = self.effects(catalogue).filter(|(index, _)| place(*index).is_some());
         let mut named: Vec<_> = named.collect();
@@ -156,22 +157,9 @@ impl<'a> Chosen<'a> {
 
     /// Lines at the top of the file.
     pub(crate) fn head(&self) -> Vec<String> {
-        let mut lines = vec![self.diagnosis.sentence.clone()];
-        lines.push(match self.diagnosis.verdict {
-            VerdictKind::NoGap => {
-                "Nothing is missing: parameters are re-tuned within the noise, and no effect is added.".into()
-            }
-            VerdictKind::Parameters => "Parameters are re-tuned; no effect is added.".into(),
-            VerdictKind::Partial => format!(
-                "{:.0} % of the gap remains: this file does not close it.",
-                100.0 * self.diagnosis.unexplained.as_ref().map_or(0.0, |u| u.share)
-            ),
-            _ => "Parameters are re-tuned with the effects in place.".to_owned(),
-        });
-        lines.push(
-            "Each tolerance is one standard deviation of the fit, if the model is right.".into(),
-        );
-        lines
+        let tolerances =
+            "Each tolerance is one standard deviation of the fit, if the model is right.";
+        vec![self.diagnosis.sentence.clone(), self.diagnosis.fix_in_words(), tolerances.into()]
     }
 
     /// Adds the comments on an effect, which is described `in_words` and by its equation, and on its parameters.
@@ -193,7 +181,7 @@ impl<'a> Chosen<'a> {
         let d = self.diagnosis;
         let share = d.shares.iter().find(|s| s.effect == effect);
         let closes = share.map_or(String::new(), |s| format!(" closes {:.0} %", 100.0 * s.closes));
-        let faint = match d.faint.iter().any(|name| name == effect) {
+        let faint = match d.answer.faint().iter().any(|name| name == effect) {
             true => ", faint, and kept because the parameters were fitted together with it",
             false => "",
         };
@@ -210,8 +198,8 @@ impl<'a> Chosen<'a> {
             ),
             equation.to_owned(),
         ];
-        if !d.tied.is_empty() && d.named.iter().any(|name| name == effect) {
-            lines.push(format!("These data cannot rule out {}.", d.tied.join(", ")));
+        if !d.answer.tied().is_empty() && d.named().iter().any(|name| name == effect) {
+            lines.push(format!("These data cannot rule out {}.", d.answer.tied().join(", ")));
         }
         lines
     }

@@ -7,7 +7,7 @@ use std::sync::{
 };
 
 use stretch_data::{Channel, SessionTrial, Split, Trial};
-use stretch_gap::{Diagnosis, GapError, Options, RandomGenerator, diagnose};
+use stretch_gap::{Diagnosis, GapError, Note, NoteCode, Options, RandomGenerator, diagnose};
 use stretch_problem::{
     Ask, BlackBox, Checked, Input, Parameter, ProblemSpec, StageEntry, Tolerance, closure,
 };
@@ -101,11 +101,8 @@ fn every_budget_ends_in_a_diagnosis_or_says_which_is_the_least() {
                 Ok(found) => {
                     let runs = found.model_runs.unwrap();
                     assert!(runs.is_spent && calls == runs.count, "{budget}: {runs:?}");
-                    let told = format!("the budget of {budget} model runs was spent");
-                    assert!(
-                        found.notes.iter().any(|note| note.to_string().contains(&told)),
-                        "{budget}"
-                    );
+                    let is_told = |note: &Note| note.code == NoteCode::BudgetSpent;
+                    assert!(found.notes.iter().any(is_told), "{budget}");
                     assert!(found.sentence.starts_with("The budget of runs was spent"));
                     let all =
                         found.cut_short.as_ref().unwrap().len() == spec(noise, lag).wrap.len();

@@ -107,7 +107,7 @@ fn examined(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (Problem, Examine
 fn by_trial(servos: &[[f64; 3]], seed: u64, has_gear: bool) -> (ByTrial, Vec<String>) {
     let (problem, examined) = examined(servos, seed, has_gear);
     let by_trial = problem.by_trial(&examined, &|_| (), &|| false).expect("fits");
-    (by_trial, examined.diagnosis.named)
+    (by_trial, examined.diagnosis.named())
 }
 
 #[test]

@@ -107,9 +107,9 @@ fn diagnosed(trials: Vec<SessionTrial>) -> Diagnosis {
 /// Whether the effect is named, or reported as an alternative to the named effects.
 fn is_told(found: &Diagnosis, name: &str) -> bool {
     let name = name.to_owned();
-    println!("{name}: {:?}, tied {:?}, {}", found.named, found.tied, found.sentence);
-    let is_tied = found.tied.contains(&name) || found.ambiguous.contains(&name);
-    found.named.contains(&name) || (!found.named.is_empty() && is_tied)
+    println!("{name}: {:?}, tied {:?}, {}", found.named(), found.answer.tied(), found.sentence);
+    let is_tied = found.answer.tied().contains(&name) || found.ambiguous.contains(&name);
+    found.named().contains(&name) || (!found.named().is_empty() && is_tied)
 }
 
 fn value(found: &Diagnosis, effect: &str, name: &str) -> f64 {
@@ -138,7 +138,7 @@ fn friction_that_builds_up_over_a_way_is_named_with_its_length() {
     };
     let found = diagnosed(recorded(contact, None));
     assert!(is_told(&found, "output.dahl_friction"), "{}", found.sentence);
-    if found.named == ["output.dahl_friction"] {
+    if found.named() == ["output.dahl_friction"] {
         let (f, s) = (
             value(&found, "output.dahl_friction", "f"),
             value(&found, "output.dahl_friction", "s"),
@@ -186,5 +186,5 @@ fn a_motor_that_gets_weaker_with_speed_is_told() {
 #[test]
 fn a_mass_alone_rubs_nowhere() {
     let found = diagnosed(recorded(|| Box::new(|_| 0.0), None));
-    assert!(found.named.is_empty(), "{:?}: {}", found.named, found.sentence);
+    assert!(found.named().is_empty(), "{:?}: {}", found.named(), found.sentence);
 }

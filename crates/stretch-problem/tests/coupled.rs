@@ -160,7 +160,7 @@ const DEAD: Lost = Lost { hip: 0.4, knee: 0.0 };
 #[test]
 fn what_the_knee_carries_of_the_hips_dead_zone_is_no_effect_of_its_own() {
     let (found, bench) = diagnosed(problem(CARRIED, DEAD, &NAMES), CARRIED, true);
-    assert_eq!(found.named, ["hip.input.dead_zone"], "{}", found.sentence);
+    assert_eq!(found.named(), ["hip.input.dead_zone"], "{}", found.sentence);
     assert!(found.candidates[0].closed > 0.99, "{}", found.sentence);
     assert!((value(&found, "hip.input.dead_zone") - DEAD.hip).abs() < 0.01, "{}", found.sentence);
     let touches = |bench: &BlackBox, name: &str| {
@@ -176,7 +176,7 @@ fn what_the_knee_carries_of_the_hips_dead_zone_is_no_effect_of_its_own() {
     // A simulator that takes altered inputs of one stage at a time: the effect on the knee stays
     // without a cause.
     let (left_out, bench) = diagnosed(problem(CARRIED, DEAD, &NAMES), CARRIED, false);
-    assert_ne!(left_out.named, found.named, "{}", left_out.sentence);
+    assert_ne!(left_out.named(), found.named(), "{}", left_out.sentence);
     assert!(bench.afterwards()[0].contains("this is left out"), "{:?}", bench.afterwards());
     assert_eq!(touches(&bench, "hip.input.dead_zone"), Some(vec![0]));
 }
@@ -185,7 +185,7 @@ fn what_the_knee_carries_of_the_hips_dead_zone_is_no_effect_of_its_own() {
 fn altered_inputs_of_both_joints_are_run_at_once() {
     let lost = Lost { hip: 0.4, knee: 0.3 };
     let (found, _) = diagnosed(problem(CARRIED, lost, &NAMES), CARRIED, true);
-    let mut named = found.named.clone();
+    let mut named = found.named();
     named.sort();
     assert_eq!(named, ["hip.input.dead_zone", "knee.input.backlash"], "{}", found.sentence);
     assert!((value(&found, "knee.input.backlash") - lost.knee).abs() < 0.03, "{}", found.sentence);
@@ -197,7 +197,7 @@ fn a_wrapper_that_acts_in_every_run_acts_on_both_joints() {
     let wrapped = vec![EffectEntry { name: "hip.input.dead_zone".into(), parameters: values }];
     let problem = ProblemSpec { wrapped, ..problem(CARRIED, DEAD, &NAMES) };
     let (found, _) = diagnosed(problem, CARRIED, true);
-    assert!(found.named.is_empty(), "{}", found.sentence);
+    assert!(found.named().is_empty(), "{}", found.sentence);
 }
 
 #[test]
@@ -226,7 +226,7 @@ fn an_experiment_drives_both_joints_at_once() {
 fn joints_that_do_not_hang_together_are_diagnosed_as_ever() {
     let (several, bench) = diagnosed(problem(0.0, DEAD, &NAMES[..1]), 0.0, true);
     let (single, other) = diagnosed(problem(0.0, DEAD, &NAMES[..1]), 0.0, false);
-    assert_eq!(several.named, ["hip.input.dead_zone"], "{}", several.sentence);
+    assert_eq!(several.named(), ["hip.input.dead_zone"], "{}", several.sentence);
     assert!(bench.description().spec().effects.iter().all(|e| e.touches.len() == 1));
     assert_eq!(bench.model_runs(), other.model_runs());
     let alike = |found| Diagnosis { runtime_s: 0.0, ..found };

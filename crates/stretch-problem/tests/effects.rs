@@ -165,8 +165,8 @@ fn an_effect_of_ones_own_is_simulated_listed_and_named() {
     assert_eq!(simulator.description().spec().effects.last().unwrap().name, "charger_ripple");
     let options = Options { depth: std::num::NonZeroUsize::new(1).unwrap(), ..Options::default() };
     let (diagnosis, _) = diagnose(&simulator, &options, &|_| (), &|| false).unwrap();
-    assert_eq!(diagnosis.verdict, VerdictKind::Effect, "{}", diagnosis.sentence);
-    assert_eq!(diagnosis.named, ["charger_ripple"]);
+    assert_eq!(diagnosis.verdict(), VerdictKind::Effect, "{}", diagnosis.sentence);
+    assert_eq!(diagnosis.named(), ["charger_ripple"]);
     let a = &diagnosis.candidates[0].parameters[0];
     // With the noise of 6000 samples, the amplitude is known to a hundredth.
     assert_relative_eq!(a.value, 0.02, epsilon = 0.0, max_relative = 0.02);
@@ -227,7 +227,7 @@ fn a_kind_of_ones_own_is_wrapped_named_and_printed() {
     let at = listed.iter().position(|name| *name == "output.ripple").unwrap();
     let black_box = BlackBox::new(problem, Arc::new(spring));
     let (diagnosis, _) = diagnose(&black_box, &Options::default(), &|_| (), &|| false).unwrap();
-    assert_eq!(diagnosis.named, ["output.ripple"], "{}", diagnosis.sentence);
+    assert_eq!(diagnosis.named(), ["output.ripple"], "{}", diagnosis.sentence);
     let a = diagnosis.candidates[0].parameters[0].value;
     // With the noise of 1500 samples, the amplitude is known to a thousandth.
     assert_relative_eq!(a, 4.0, epsilon = 0.0, max_relative = 0.005);

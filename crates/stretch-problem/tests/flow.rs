@@ -5,7 +5,7 @@
 use std::sync::Arc;
 
 use stretch_data::{Channel, SessionTrial, Split, Trial};
-use stretch_gap::{Options, RandomGenerator, VerdictKind};
+use stretch_gap::{NoteCode, Options, RandomGenerator, VerdictKind};
 use stretch_problem::{
     Argument, Ask, BlackBox, Checked, EffectEntry, Examined, Fixed, NoFix, OwnEffect, Parameter,
     Problem, ProblemSpec, RecordedSession, StageEntry, Tolerance, closure,
@@ -138,7 +138,7 @@ fn fixed(examined: &Examined, trials: Vec<SessionTrial>) -> (ProblemSpec, String
 }
 
 fn agrees(examined: &Examined) -> bool {
-    matches!(examined.diagnosis.verdict, VerdictKind::NoGap | VerdictKind::Parameters)
+    matches!(examined.diagnosis.verdict(), VerdictKind::NoGap | VerdictKind::Parameters)
 }
 
 #[test]
@@ -146,10 +146,11 @@ fn hidden_play_is_named_written_into_the_problem_and_agrees_then() {
     let trials = recorded(|x| play(0.4, &line(3.05, 0.0, x)));
     let wrap = ["output.backlash", "output.skew", "output.curve"];
     let found = examined(described(trials.clone(), &wrap), line);
-    assert_eq!(found.diagnosis.named, ["output.backlash"], "{}", found.diagnosis.sentence);
-    let notes: Vec<String> = found.diagnosis.notes.iter().map(ToString::to_string).collect();
-    let friction = "output.backlash: dry friction inside the machine looks alike";
-    assert!(notes.iter().any(|note| note.starts_with(friction)), "{notes:?}");
+    assert_eq!(found.diagnosis.named(), ["output.backlash"], "{}", found.diagnosis.sentence);
+    let notes = &found.diagnosis.notes;
+    let friction = notes.iter().find(|note| note.code == NoteCode::LooksLikeFriction);
+    let begins = "output.backlash: dry friction inside the machine looks alike";
+    assert!(friction.expect("a note").to_string().starts_with(begins), "{notes:?}");
     let one = &found.implementations[0];
     assert_eq!((one.name.as_str(), one.stage.as_str()), ("output.backlash", "gear"));
     assert!(
@@ -177,7 +178,7 @@ fn what_stands_in_front_of_a_simulator_is_written_as_well() {
     };
     let trials = recorded(late);
     let found = examined(described(trials.clone(), &["input.delay", "output.backlash"]), lagging);
-    assert_eq!(found.diagnosis.named, ["input.delay"], "{}", found.diagnosis.sentence);
+    assert_eq!(found.diagnosis.named(), ["input.delay"], "{}", found.diagnosis.sentence);
     let (spec, _) = fixed(&found, trials);
     let again = examined(spec, lagging);
     assert!(agrees(&again), "{}", again.diagnosis.sentence);
@@ -194,7 +195,7 @@ fn a_delayed_command_that_does_not_begin_at_zero_is_no_clock_of_the_output() {
     let wrap = ["input.delay", "output.delay", "output.skew"];
     let trials = recorded(late);
     let found = examined(described(trials.clone(), &wrap), lagging);
-    assert_eq!(found.diagnosis.named, ["input.delay"], "{}", found.diagnosis.sentence);
+    assert_eq!(found.diagnosis.named(), ["input.delay"], "{}", found.diagnosis.sentence);
     let (spec, _) = fixed(&found, trials);
     let values = &spec.wrapped[0].parameters;
     assert!((values["delay_s"] - 0.06).abs() < 1e-3, "{values:?}");
@@ -207,7 +208,7 @@ fn a_delayed_command_that_does_not_begin_at_zero_is_no_clock_of_the_output() {
 fn an_effect_that_the_simulator_has_itself_gets_its_value() {
     let trials = recorded(|x| line(3.0, 0.02, x));
     let found = examined(described(trials.clone(), &["output.backlash"]), line);
-    assert_eq!(found.diagnosis.named, ["bend"], "{}", found.diagnosis.sentence);
+    assert_eq!(found.diagnosis.named(), ["bend"], "{}", found.diagnosis.sentence);
     let (spec, text) = fixed(&found, trials);
     let value = spec.effects[0].arguments[0].value.expect("a value");
     assert!((value - 0.02).abs() < 0.001, "{value}");
@@ -242,7 +243,7 @@ fn the_one_json_has_version_seed_and_what_follows() {
     let trials = recorded(|x| play(0.4, &line(3.0, 0.0, x)));
     let found = examined(described(trials, &["output.backlash"]), line);
     let json = found.to_json();
-    assert_eq!((&json["schema"], &json["seed"]), (&1.into(), &5.into()));
+    assert_eq!((&json["schema"], &json["seed"]), (&2.into(), &5.into()));
     assert_eq!(json["version"], env!("CARGO_PKG_VERSION"));
     assert_eq!(json["implement"][0]["effect"], "output.backlash");
     assert!(json["fixed_rig"].is_null());

@@ -232,10 +232,10 @@ fn every_fault_is_named_or_shares_the_set_with_its_twins() {
     let found =
         all(&cases, |&((fault, ..), count, seed)| run(&trials(fault, 0.3, count, seed), &[]));
     for (((fault, name, twins), count, _), d) in cases.iter().zip(found) {
-        let what = format!("{fault:?}, {count} trials: {:?} of {:?}", d.named, d.ambiguous);
-        assert_eq!(d.verdict, VerdictKind::Effect, "{what}");
-        assert!(d.named.len() == 1 && d.ambiguous.iter().any(|a| a == name), "{what}");
-        assert!(d.named[0] == *name || twins.contains(&d.named[0].as_str()), "{what}");
+        let what = format!("{fault:?}, {count} trials: {:?} of {:?}", d.named(), d.ambiguous);
+        assert_eq!(d.verdict(), VerdictKind::Effect, "{what}");
+        assert!(d.named().len() == 1 && d.ambiguous.iter().any(|a| a == name), "{what}");
+        assert!(d.named()[0] == *name || twins.contains(&d.named()[0].as_str()), "{what}");
         // The rest of the gap comes from the different equation of the fault.
         let best = &d.candidates[0];
         assert!(best.closed > 0.9 && best.closed_ci[0] > 0.5, "{what}, {best:?}");
@@ -256,8 +256,8 @@ fn a_gauge_without_a_fault_gets_no_name() {
     let cases: Vec<_> = (0..10).flat_map(|seed| [(3, 100 + seed), (1, 200 + seed)]).collect();
     let found = all(&cases, |&(count, seed)| run(&trials(Fault::None, 0.0, count, seed), &[]));
     for (case, d) in cases.iter().zip(found) {
-        let is_quiet = matches!(d.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
-        assert!(is_quiet && d.named.is_empty(), "{case:?}: {}", d.sentence);
+        let is_quiet = matches!(d.verdict(), VerdictKind::NoGap | VerdictKind::Parameters);
+        assert!(is_quiet && d.named().is_empty(), "{case:?}: {}", d.sentence);
     }
 }
 
@@ -265,16 +265,16 @@ fn a_gauge_without_a_fault_gets_no_name() {
 fn what_the_catalogue_lacks_is_not_given_a_name_but_shares_are_told() {
     let found = all(&[21, 22], |&seed| run(&trials(Fault::DirectionStep, 1.0, 3, seed), &[]));
     for d in found {
-        assert_eq!(d.verdict, VerdictKind::Unknown, "{}", d.sentence);
-        assert!(d.named.is_empty() && !d.shares.is_empty());
+        assert_eq!(d.verdict(), VerdictKind::Unknown, "{}", d.sentence);
+        assert!(d.named().is_empty() && !d.shares.is_empty());
         assert!(d.sentence.contains("Parts of it close"), "{}", d.sentence);
         // The gap differs between regimes of motion (rising, falling, at rest).
         assert!(d.location.slices.iter().any(|s| s.by == "regime" && s.stands_out));
     }
     // The effect and the effect that imitates it are both removed from the catalogue.
     let d = run(&trials(Fault::Wear, 1.0, 3, 11), &["gauge_softening", "thermal_drift"]);
-    assert!(!d.named.contains(&"gauge_softening".to_owned()));
-    assert_ne!(d.verdict, VerdictKind::NoGap);
+    assert!(!d.named().contains(&"gauge_softening".to_owned()));
+    assert_ne!(d.verdict(), VerdictKind::NoGap);
 }
 
 #[test]
@@ -284,7 +284,7 @@ fn play_in_the_reference_is_never_given_another_name() {
     let found = all(&[31, 32], |&seed| run(&trials(Fault::LooseReference, 1.0, 3, seed), &[]));
     for d in found {
         assert!(
-            d.verdict == VerdictKind::Unknown || d.named[0] == "pot_backlash",
+            d.verdict() == VerdictKind::Unknown || d.named()[0] == "pot_backlash",
             "{}",
             d.sentence
         );
@@ -350,11 +350,11 @@ fn a_rig_file_gives_the_nominal_gauge() {
     let gain = |d: &Diagnosis| d.parameters.iter().find(|p| p.name == "gain").cloned().unwrap();
     // A gain that is off by two of its tolerances is re-tuned and reported.
     let d = run(-0.82);
-    assert_eq!(d.verdict, VerdictKind::Parameters, "{}", d.sentence);
+    assert_eq!(d.verdict(), VerdictKind::Parameters, "{}", d.sentence);
     assert!(gain(&d).is_evidence);
     assert_abs_diff_eq!(gain(&d).fitted, -0.9, epsilon = GAIN_FOUND);
     // A gain that is right is not re-tuned.
-    assert_eq!(run(-0.9).verdict, VerdictKind::NoGap);
+    assert_eq!(run(-0.9).verdict(), VerdictKind::NoGap);
     let whole = RigFile::parse("rig.toml", "[sensing]\nR0 = { value = 4.0 }\n").expect("a rig");
     let refused = GaugeRig::from_file(&whole).unwrap_err();
     assert!(refused.to_string().contains("kind"), "{refused}");
@@ -379,7 +379,7 @@ fn uneven_and_broken_records_are_mended_and_told() {
     assert!(gauge.notes().iter().any(|n| n.contains("missing after 29.9")), "{:?}", gauge.notes());
     assert!(gauge.notes().iter().any(|n| n.contains("unevenly")), "{:?}", gauge.notes());
     let d = diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
-    assert_eq!(d.named, ["channel_skew"], "{}", d.sentence);
+    assert_eq!(d.named(), ["channel_skew"], "{}", d.sentence);
     let skew = d.candidates[0].by_name["skew_s"];
     assert_abs_diff_eq!(skew, 0.03, epsilon = SKEW_FOUND_S);
 }
@@ -388,12 +388,12 @@ fn uneven_and_broken_records_are_mended_and_told() {
 fn lost_rows_change_no_verdict() {
     let trials = trials(Fault::TwoLags, 0.3, 3, 11);
     let whole = run(&trials, &[]);
-    assert_eq!(whole.named, ["gauge_relaxation"], "{}", whole.sentence);
+    assert_eq!(whole.named(), ["gauge_relaxation"], "{}", whole.sentence);
     for share in [0.0, 0.01] {
         let lost = with_lost_rows(&trials, share, 5);
         let d = run(&lost, &[]);
         let what = format!("{share} lost: {}", d.sentence);
-        assert_eq!((d.verdict, &d.named), (whole.verdict, &whole.named), "{what}");
+        assert_eq!((d.verdict(), &d.named()), (whole.verdict(), &whole.named()), "{what}");
         let (was, is) = (whole.candidates[0].probability, d.candidates[0].probability);
         assert!(abs_diff_eq!(was, is, epsilon = PROBABILITY), "{what}: {was} {is}");
     }
@@ -414,8 +414,8 @@ fn a_gauge_that_has_the_effect_agrees_and_one_without_tolerance_stays_put() {
     let gauge = gauge.expect("a gauge");
     assert!(gauge.description().spec().effects.iter().all(|e| e.name != "channel_skew"));
     let d = diagnose(&gauge, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
-    let agrees = matches!(d.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
-    assert!(agrees && d.named.is_empty(), "{}", d.sentence);
+    let agrees = matches!(d.verdict(), VerdictKind::NoGap | VerdictKind::Parameters);
+    assert!(agrees && d.named().is_empty(), "{}", d.sentence);
     assert!(d.parameters.iter().all(|p| p.name != "offset"), "{:?}", d.parameters);
 }
 
@@ -470,5 +470,5 @@ fn a_swapped_pair_and_a_foreign_signal_get_no_name() {
     let other = trials(Fault::None, 0.0, 1, 6);
     mixed[0].trial.channels[1] = other[0].trial.channels[1].clone();
     let d = run(&mixed, &[]);
-    assert!(d.named.is_empty() && d.verdict == VerdictKind::Unknown, "{}", d.sentence);
+    assert!(d.named().is_empty() && d.verdict() == VerdictKind::Unknown, "{}", d.sentence);
 }

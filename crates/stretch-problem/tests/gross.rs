@@ -338,13 +338,16 @@ fn answer(case: &Case, seed: u64) -> Answer {
             simulations: 0,
         },
         Ok(d) => Answer {
-            verdict: format!("{:?}", d.verdict),
-            is_right: d.verdict == VerdictKind::Parameters && case.reported.is_empty()
-                || d.verdict == VerdictKind::Record
+            verdict: format!("{:?}", d.verdict()),
+            is_right: d.verdict() == VerdictKind::Parameters && case.reported.is_empty()
+                || d.verdict() == VerdictKind::Record
                     && case.reported.iter().any(|(what, name)| {
-                        d.gross.iter().any(|g| g.what == *what && g.sentence.contains(name))
+                        d.answer
+                            .gross()
+                            .iter()
+                            .any(|g| g.what == *what && g.sentence.contains(name))
                     }),
-            is_wrong: matches!(d.verdict, VerdictKind::Effect | VerdictKind::Partial),
+            is_wrong: matches!(d.verdict(), VerdictKind::Effect | VerdictKind::Partial),
             sentence: d.sentence,
             simulations: d.simulations,
         },
@@ -375,9 +378,9 @@ fn an_error_is_told_though_rows_are_lost() {
     let first = diagnosed(&case, &whole).expect("a diagnosis");
     let lost = diagnosed(&case, &with_lost_rows(&whole, 0.01, 3)).expect("a diagnosis");
     for diagnosis in [&first, &lost] {
-        assert_eq!(diagnosis.verdict, VerdictKind::Record, "{}", diagnosis.sentence);
-        assert!(diagnosis.named.is_empty() && diagnosis.ambiguous.is_empty());
-        let gain = diagnosis.gross.iter().find(|g| g.parameter.as_deref() == Some("G"));
+        assert_eq!(diagnosis.verdict(), VerdictKind::Record, "{}", diagnosis.sentence);
+        assert!(diagnosis.named().is_empty() && diagnosis.ambiguous.is_empty());
+        let gain = diagnosis.answer.gross().iter().find(|g| g.parameter.as_deref() == Some("G"));
         let found = gain.and_then(|g| g.found).expect("a gain");
         approx::assert_relative_eq!(found, 10.0, epsilon = 0.0, max_relative = GAIN_FOUND);
     }

@@ -47,16 +47,16 @@ fn holds(what: &str, change: impl Fn(&Case, &mut Vec<SessionTrial>) -> Rig) {
     for case in cases() {
         let before = diagnosed(&recorded(&case), Rig::default());
         let expected: &[&str] = if case.name == "none" { &[] } else { &[case.name] };
-        assert_eq!(before.named, expected, "as recorded: {}", before.sentence);
+        assert_eq!(before.named(), expected, "as recorded: {}", before.sentence);
         let mut trials = recorded(&case);
         let rig = change(&case, &mut trials);
         let after = diagnosed(&trials, rig);
         let what = format!("{what}, {}: {}", case.name, after.sentence);
-        assert_eq!(after.named, before.named, "{what}");
-        assert_eq!(after.verdict, before.verdict, "{what}");
+        assert_eq!(after.named(), before.named(), "{what}");
+        assert_eq!(after.verdict(), before.verdict(), "{what}");
         // A set may lose or gain improbable effects; it still holds the true effect.
         assert!(expected.iter().all(|name| after.ambiguous.iter().any(|a| a == name)), "{what}");
-        assert_eq!(after.verdict == VerdictKind::Parameters, case.name == "none", "{what}");
+        assert_eq!(after.verdict() == VerdictKind::Parameters, case.name == "none", "{what}");
     }
 }
 
@@ -269,7 +269,7 @@ fn a_trial_at_another_excitation_is_no_gap() {
     dimmed.trial.channels.push(Channel { name: "excitation_share".into(), values: share });
     trials[2] = dimmed;
     let diagnosis = diagnosed(&trials, Rig::default());
-    assert_eq!(diagnosis.verdict, VerdictKind::Parameters, "{}", diagnosis.sentence);
+    assert_eq!(diagnosis.verdict(), VerdictKind::Parameters, "{}", diagnosis.sentence);
     // Without the column, the same recordings show a gap.
     trials[2].trial.channels.pop();
     let blind = diagnosed(&trials, Rig::default());
@@ -294,6 +294,6 @@ fn few_rows_carry_no_name() {
     }
     let diagnosis = diagnosed(&trials, Rig::default());
     assert!(diagnosis.rows_used.share() < 0.5, "{:?}", diagnosis.rows_used);
-    assert_eq!(diagnosis.verdict, VerdictKind::Unknown, "{}", diagnosis.sentence);
-    assert!(diagnosis.named.is_empty() && diagnosis.sentence.contains("of the rows"));
+    assert_eq!(diagnosis.verdict(), VerdictKind::Unknown, "{}", diagnosis.sentence);
+    assert!(diagnosis.named().is_empty() && diagnosis.sentence.contains("of the rows"));
 }

@@ -188,7 +188,7 @@ fn six_joints_with_sixty_parameters_are_diagnosed() {
     let found = diagnose(&bench, &Options::default(), &|_| (), &|| false).expect("a diagnosis").0;
     println!(
         "{:?} in {:.1} s, {} runs of {:.2} ms, {} simulations: {}",
-        found.named,
+        found.named(),
         begun.elapsed().as_secs_f64(),
         bench.model_runs(),
         1e3 * each.as_secs_f64(),
@@ -197,7 +197,7 @@ fn six_joints_with_sixty_parameters_are_diagnosed() {
     );
     let notes = bench.afterwards();
     assert!(notes.len() == 1 && notes[0].starts_with("altered inputs act"), "{notes:?}");
-    let mut named = found.named.clone();
+    let mut named = found.named();
     named.sort();
     assert_eq!(named, ["joint1.output.backlash", "joint4.input.dead_zone"], "{}", found.sentence);
 }

@@ -98,7 +98,7 @@ fn a_pendulum_that_turns_over_lacks_no_wrapper() {
         let bench = problem(truth);
         let (told, _) =
             diagnose(&bench, &Options::default(), &|_| (), &|| false).expect("a diagnosis");
-        assert_eq!(told.verdict, VerdictKind::Parameters, "{}", told.sentence);
+        assert_eq!(told.verdict(), VerdictKind::Parameters, "{}", told.sentence);
         assert!(told.gap.retuned < 0.2 && told.starts.agreed < told.starts.tried, "{:?}", told.gap);
         for (p, truth) in told.parameters.iter().zip(truth) {
             approx::assert_relative_eq!(p.fitted, truth, max_relative = 0.01);

@@ -114,7 +114,7 @@ fn the_limits_of_a_profile_are_found_beside_gains_of_any_tolerance() {
         let told = diagnose(&bench, &Options::default(), &|_| (), &|| false).expect("told").0;
         let values = &told.candidates[0].parameters;
         let case = format!("{} runs {}: {values:?}", told.sentence, bench.model_runs());
-        assert_eq!(told.named, ["input.profile"], "{case}");
+        assert_eq!(told.named(), ["input.profile"], "{case}");
         for (value, truth) in values.iter().zip(limits) {
             assert!((value.value / truth - 1.0).abs() < 0.05, "{truth} {case}");
         }

@@ -121,7 +121,7 @@ fn a_simulator_that_does_not_answer_what_it_is_asked_is_told() {
         let bench = springs(trials, simulator);
         let told = match diagnose(&bench, &Options::default(), &|_| (), &|| false) {
             Err(error @ GapError::Broken(_)) if is_refused => error.to_string(),
-            Ok((found, _)) if !is_refused && found.named.is_empty() => {
+            Ok((found, _)) if !is_refused && found.named().is_empty() => {
                 bench.afterwards().join("\n")
             }
             other => panic!("{i}: {other:?}"),

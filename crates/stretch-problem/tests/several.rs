@@ -90,7 +90,7 @@ fn diagnosed(late_s: [f64; 3], tau_s: f64) -> Diagnosis {
 #[test]
 fn a_shift_that_all_signals_share_is_the_recorders() {
     let found = diagnosed([0.06; 3], 0.0);
-    assert_eq!(found.named, ["record.skew"], "{}", found.sentence);
+    assert_eq!(found.named(), ["record.skew"], "{}", found.sentence);
     let late = &found.candidates[0].parameters[0];
     assert!((late.value - 0.06).abs() < 0.005, "{}", late.value);
 }
@@ -98,15 +98,15 @@ fn a_shift_that_all_signals_share_is_the_recorders() {
 #[test]
 fn a_shift_that_one_signal_has_is_its_own() {
     let found = diagnosed([0.0, 0.06, 0.0], 0.0);
-    assert_eq!(found.named, ["bend.output.skew"], "{}", found.sentence);
+    assert_eq!(found.named(), ["bend.output.skew"], "{}", found.sentence);
 }
 
 #[test]
 fn what_one_signal_remembers_is_no_shift() {
     let found = diagnosed([0.0; 3], 0.1);
-    assert_eq!(found.named, ["turn.output.lag"], "{}", found.sentence);
+    assert_eq!(found.named(), ["turn.output.lag"], "{}", found.sentence);
     let found = diagnosed([0.06; 3], 0.1);
-    let mut named = found.named.clone();
+    let mut named = found.named();
     named.sort();
     assert_eq!(named, ["record.skew", "turn.output.lag"], "{}", found.sentence);
 }

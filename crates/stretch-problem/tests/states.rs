@@ -115,7 +115,7 @@ fn diagnosed(spill: f64, greatest: f64) -> Diagnosis {
 }
 
 fn is_overflow(found: &Diagnosis, spill: f64) {
-    assert_eq!(found.named, ["state.upper.spill"], "{}", found.sentence);
+    assert_eq!(found.named(), ["state.upper.spill"], "{}", found.sentence);
     let level = &found.candidates[0].parameters[0];
     assert!((level.value - spill).abs() < 0.2, "{level:?}");
 }
@@ -137,7 +137,7 @@ fn an_overflow_is_named_where_most_of_its_range_does_nothing() {
 #[test]
 fn tanks_that_spill_nothing_are_agreed_with() {
     let found = diagnosed(f64::INFINITY, 30.0);
-    assert!(found.named.is_empty(), "{:?}: {}", found.named, found.sentence);
+    assert!(found.named().is_empty(), "{:?}: {}", found.named(), found.sentence);
 }
 
 #[test]

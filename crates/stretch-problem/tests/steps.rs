@@ -107,8 +107,8 @@ fn step_tests_answer_alike_with_rest_before_and_without() {
         for (level, rest) in [(0.0, 25), (0.0, 0), (0.4, 0)] {
             let (told, notes) = told(front, level, rest);
             let case = format!("{name} {level} {rest}: {} {notes:?}", told.sentence);
-            assert_eq!(told.named, [name], "{case}");
-            assert_eq!(told.verdict, VerdictKind::Effect, "{case}");
+            assert_eq!(told.named(), [name], "{case}");
+            assert_eq!(told.verdict(), VerdictKind::Effect, "{case}");
             let value = told.candidates[0].parameters[0].value;
             assert!((value / truth - 1.0).abs() < 0.03, "{value} {case}");
             assert!((told.parameters[0].sigmas).abs() < 0.5, "{case}");

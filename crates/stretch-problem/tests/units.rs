@@ -77,8 +77,8 @@ fn other_units_are_told_by_their_names() {
         ("mV", 1e-3, "V for mV"),
     ] {
         let told = told(unit, ratio, [0.03, 0.1]);
-        assert_eq!(told.verdict, VerdictKind::Record, "{units}: {}", told.sentence);
-        assert_eq!(told.gross[0].units.as_deref(), Some(units), "{}", told.sentence);
+        assert_eq!(told.verdict(), VerdictKind::Record, "{units}: {}", told.sentence);
+        assert_eq!(told.answer.gross()[0].units.as_deref(), Some(units), "{}", told.sentence);
         let begins = "Simulation and recording differ by a factor: the simulated output is ";
         assert!(told.sentence.starts_with(begins), "{}", told.sentence);
         // the parameters have tolerances already
@@ -92,7 +92,7 @@ fn other_units_are_told_by_their_names() {
 fn a_factor_beside_parameters_without_tolerance_is_told_as_a_factor() {
     for (ratio, says) in [(0.8, "0.8"), (1.25, "1.25")] {
         let told = told("rad/s", ratio, [0.0, 0.0]);
-        assert_eq!(told.verdict, VerdictKind::Record, "{}", told.sentence);
+        assert_eq!(told.verdict(), VerdictKind::Record, "{}", told.sentence);
         let begins =
             format!("Simulation and recording differ by a factor: the simulated output is {says}");
         assert!(told.sentence.starts_with(&begins[..begins.len() - 1]), "{}", told.sentence);

@@ -94,7 +94,7 @@ fn diagnosed(command: &[&str], jobs: usize) -> Diagnosis {
 #[test]
 fn a_worker_in_c_is_diagnosed() {
     let in_c = in_c();
-    assert_eq!(in_c.named, ["brake"], "{}", in_c.sentence);
+    assert_eq!(in_c.named(), ["brake"], "{}", in_c.sentence);
 }
 
 #[test]

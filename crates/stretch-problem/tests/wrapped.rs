@@ -106,7 +106,7 @@ fn a_simulator_agrees_with_a_record_that_wraps() {
     ] {
         let (told, notes) = told(output, scale, low, wraps);
         let case = format!("{output}, {low}, {wraps:?}: {} {notes:?}", told.sentence);
-        assert!(matches!(told.verdict, VerdictKind::NoGap | VerdictKind::Parameters), "{case}");
+        assert!(matches!(told.verdict(), VerdictKind::NoGap | VerdictKind::Parameters), "{case}");
         assert!(told.gap.raw < 0.1, "{case}");
         let says =
             format!("{output} jumps by {}", if scale == 1.0 { "360 deg" } else { "2 pi rad" });

@@ -1,6 +1,5 @@
 //! The report of a diagnosis: the correction of the simulator, its probability, and its gain.
 
-use stretch_data::listed;
 use stretch_gap::{Diagnosis, nouns};
 use stretch_problem::{effect_in_words, in_words, notation};
 use stretch_sim::Language;
@@ -14,12 +13,11 @@ use super::{
         transfer_table,
     },
     figure::Figure,
-    first_seconds::{GIVEN, causes, facts, headline},
     gap_figures::{
         AFTER, Against, BEFORE, after_name, has_after, left_figure, shown, trace_figures,
     },
     live::Pick,
-    markup::{multiple, number, percent},
+    markup::{multiple, percent},
     output_table::output_table,
     page::Page,
     subject::Subject,
@@ -35,6 +33,27 @@ pub fn diagnosis_page(subject: &Subject<'_>) -> String {
     page.finish()
 }
 
+/// Returns the headline of the report.
+pub(crate) fn headline(subject: &Subject<'_>) -> String {
+    unbroken(&subject.diagnosis.title())
+}
+
+/// Returns a text in which percentages are not broken across lines.
+fn unbroken(text: &str) -> String {
+    text.replace(" %", "\u{a0}%")
+}
+
+/// Returns a sentence for every named effect. The numbers of an effect are in the section with its code.
+fn causes(subject: &Subject<'_>) -> Vec<String> {
+    let d = subject.diagnosis;
+    let one = |name: String| {
+        let mut all = subject.implementations.iter();
+        let own = all.find(|own| effect_in_words(&own.name, d) == name);
+        own.map(|own| format!("{name}: {}.", own.words))
+    };
+    d.named().into_iter().filter_map(one).collect()
+}
+
 /// Title of the report.
 pub(crate) fn diagnosis_title(subject: &Subject<'_>) -> String {
     let [simulator, rig] = nouns(subject.diagnosis.gauge_alone);
@@ -45,10 +64,10 @@ pub(crate) fn diagnosis_title(subject: &Subject<'_>) -> String {
 pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
     let diagnosis = subject.diagnosis;
     left_over(page, subject);
-    page.facts(&facts(diagnosis));
+    page.facts(&diagnosis.facts().map(|(question, answer)| (question, unbroken(&answer))));
     page.list(&causes(subject));
-    if let Some(proposed) = diagnosis.proposed.as_ref().filter(|p| !p.equation.is_empty()) {
-        page.text(&format!("Proposed, on the {}: {}.", proposed.acts, proposed.equation));
+    if let Some(proposed) = diagnosis.proposed_in_words() {
+        page.text(&proposed);
     }
     seen(page, subject);
     located(page, subject);
@@ -314,14 +333,8 @@ fn named(page: &mut Page, subject: &Subject<'_>) {
         ),
     ]);
     // effects of one set are reported together, so only an effect outside the named set is an alternative
-    let rivals: Vec<String> =
-        d.ambiguous.iter().filter(|name| !d.named.contains(name)).cloned().collect();
-    if !rivals.is_empty() && !d.named.is_empty() {
-        page.text(&format!(
-            "These data cannot tell {} from {} with 95 % probability, {GIVEN}.",
-            listed(&d.named),
-            listed(&rivals)
-        ));
+    if let Some(rivals) = d.rivals_in_words() {
+        page.text(&unbroken(&rivals));
     }
     page.folded("Every candidate and its numbers", |page| {
         page.table(&candidate_table(&d.candidates));
@@ -403,18 +416,7 @@ fn detectable(page: &mut Page, d: &Diagnosis) {
 fn next(page: &mut Page, d: &Diagnosis) {
     let Some(next) = &d.next_experiment else { return };
     page.section("What to measure next", "");
-    if next.separates.is_empty() {
-        page.text(&next.why);
-        return;
-    }
-    page.text(&format!(
-        "{} ({} min) would tell {} apart: whatever their parameters, they differ by {} times the noise. {}",
-        next.name.replace('_', " "),
-        number(next.minutes, 2),
-        listed(&next.separates),
-        number(next.d, 2),
-        next.why
-    ));
+    page.text(&next.in_words());
 }
 
 fn numbers(page: &mut Page, d: &Diagnosis) {

@@ -181,7 +181,7 @@ pub(crate) fn slice_table(slices: &[SliceGap], stage: &str) -> Option<Table> {
 /// ```
 /// use stretch_gap::DetectionLimit;
 /// use stretch_report::limit_table;
-/// let limit = r#"{ "effect": "creep", "parameter": "c", "strength": null, "unit": "1", "seen": 0.0123, "like": "relaxation" }"#;
+/// let limit = r#"{ "effect": "creep", "parameter": "c", "strength": null, "unit": "1", "others": {}, "seen": 0.0123, "like": "relaxation" }"#;
 /// let limit: DetectionLimit = serde_json::from_str(limit)?;
 /// let row = ["creep", "c", "0.0123", "cannot be told apart from relaxation"];
 /// assert_eq!(limit_table(&[limit]).rows[0], row);

@@ -34,7 +34,7 @@ pub(crate) fn has_after(subject: &Subject<'_>) -> bool {
 
 /// Name of the curve of the simulator with the effect.
 pub(crate) fn after_name(diagnosis: &Diagnosis) -> String {
-    match diagnosis.named.as_slice() {
+    match &diagnosis.named()[..] {
         [] => "with the best effects of the catalogue".to_owned(),
         [one] => format!("with {one}"),
         // a legend of three names is longer than a phone is wide

@@ -11,7 +11,6 @@ mod dots_figure;
 mod error_figure;
 mod estimate_figure;
 mod figure;
-mod first_seconds;
 mod gap_figures;
 mod live;
 mod markup;

@@ -25,7 +25,8 @@ pub fn output_table(
     if stages.len() < 2 {
         return None;
     }
-    let found: Vec<&String> = d.named.iter().chain(&d.faint).collect();
+    let (named, faint) = (d.named(), d.answer.faint());
+    let found: Vec<&String> = named.iter().chain(faint).collect();
     let row = |(index, stage): (usize, &stretch_gap::StageSpec)| {
         let acts = simulator.effects().iter().filter(|spec| spec.touches.contains(&index));
         let names: Vec<String> = acts.map(|spec| called(&spec.name)).collect();
@@ -34,7 +35,7 @@ pub fn output_table(
         let left = |of: fn(&stretch_gap::StageGap) -> f64| {
             gap.map_or_else(|| NONE.to_owned(), |gap| times(of(gap)))
         };
-        let lacks = own.iter().map(|name| match d.faint.contains(name) {
+        let lacks = own.iter().map(|name| match faint.contains(name) {
             true => format!("{name} (faint)"),
             false => (*name).clone(),
         });
@@ -175,7 +176,7 @@ mod tests {
         let examined =
             problem.examine(&Options::default(), false, &|_| (), &|| false).expect("a diagnosis");
         let d = &examined.diagnosis;
-        assert_eq!(d.named, ["joint1.output.backlash"], "{}", d.sentence);
+        assert_eq!(d.named(), ["joint1.output.backlash"], "{}", d.sentence);
         let table = output_table(d, problem.simulator(), &str::to_owned).expect("two outputs");
         let [first, second] = &table.rows[..] else { panic!("{table:?}") };
         assert_eq!((first[0].as_str(), first[4].as_str()), ("joint0", NONE));

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use serde_json::{Value, from_value, json};
 use stretch_data::{Channel, SessionTrial, Split, Trial};
 use stretch_effects::{Extent, Quantity, Signals, kinds::BACKLASH};
-use stretch_gap::{Diagnosis, Evidence, Gross, Options, Transfer, TransferError, VerdictKind};
+use stretch_gap::{Answer, Diagnosis, Evidence, Options, Transfer, TransferError, VerdictKind};
 use stretch_problem::{
     Ask, BlackBox, Checked, Implementation, Parameter, Problem, ProblemSpec, StageEntry, Tolerance,
     closure,
@@ -20,7 +20,6 @@ const ANSWERS: &str = include_str!("../../stretch-gap/src/verdict/tests/answers.
 const SAMPLES: usize = 400;
 const PLAY: &str = "lag.output.backlash";
 const LOOP: &str = "lag.output.bouc_wen";
-const LAG: &str = "line.input.lag";
 
 /// A line and a lag behind it, which differ from their recordings by noise only, and the evidence of their diagnosis.
 fn line_and_lag() -> &'static (Problem, Evidence) {
@@ -95,21 +94,22 @@ fn trial(trial: usize) -> SessionTrial {
 }
 
 /// Returns an answer of stretch-gap by its name: its value, its sentence and its notes.
-fn said(name: &str) -> (Value, String, Vec<String>) {
+fn said(name: &str) -> (Value, String, Vec<Value>) {
     let answers: Value = serde_json::from_str(ANSWERS).expect("JSON");
     let mut blocks = SENTENCES.split("# ").map(str::lines);
     let mut lines = blocks.find_map(|mut lines| (lines.next()? == name).then_some(lines));
     let mut lines = lines.take().expect(name);
     let sentence = lines.next().expect("a sentence").to_owned();
-    let notes = lines.filter_map(|line| line.strip_prefix("note: ")).map(str::to_owned);
+    let notes = lines.filter_map(|line| line.strip_prefix("note: "));
+    let notes = notes.map(|text| json!({"code": "recording", "text": text}));
     (answers[name].clone(), sentence, notes.collect())
 }
 
 /// A diagnosis that names no effect.
-fn answer(verdict: VerdictKind, name: &str) -> Diagnosis {
+fn answer(name: &str) -> Diagnosis {
     let (value, sentence, notes) = said(name);
-    let agrees = matches!(verdict, VerdictKind::NoGap | VerdictKind::Parameters);
-    let lag = if agrees { [30.0, 0.004, 0.004] } else { [30.0, 8.0, 0.002] };
+    let answer: Answer = from_value(value.clone()).expect("an answer");
+    let lag = if answer.agrees() { [30.0, 0.004, 0.004] } else { [30.0, 8.0, 0.002] };
     let stage = |name: &str, channel: &str, share: f64, [raw, excess, after]: [f64; 3]| {
         json!({
             "stage": name, "channel": channel, "share": share, "raw": raw, "excess": excess, "after": after,
@@ -123,9 +123,13 @@ fn answer(verdict: VerdictKind, name: &str) -> Diagnosis {
         })
     };
     from_value(json!({
-        "schema": 1, "verdict": verdict, "answer": value, "sentence": sentence, "named": [], "ambiguous": [],
-        "candidates": [], "least_gap": 0.05, "null_band": 0.02, "notes": notes, "runtime_s": 12.34,
+        "schema": 2, "answer": value, "sentence": sentence, "not_examined": [], "ambiguous": [],
+        "candidates": [], "shares": [], "stabilities": [], "least_gap": 0.05,
+        "gap": {"raw": 0.0, "retuned": 0.0, "left": 0.0}, "null_band": 0.02, "detection_limits": [],
+        "identifiability": [], "notes": notes, "rows_used": {"used": 0, "read": 0}, "simulations": 0,
+        "starts": {"tried": 1, "agreed": 1}, "runtime_s": 12.34,
         "where": {
+            "end_to_end": [],
             "stages": [
                 stage("line", "y0_mm", 0.06, [0.3, 0.1, 0.1]),
                 stage("lag", "y1_mm", 0.94, lag),
@@ -136,8 +140,8 @@ fn answer(verdict: VerdictKind, name: &str) -> Diagnosis {
             ],
         },
         "parameters": [
-            {"name": "gain", "unit": "1", "nominal": 2.0, "fitted": 2.23, "sd": 0.01, "sigmas": 2.3, "bent": 2.41, "is_evidence": true},
-            {"name": "zero", "unit": "mm", "nominal": 0.1, "fitted": 0.12, "sd": 0.02, "sigmas": 0.4, "bent": 0.1, "is_evidence": false},
+            {"name": "gain", "unit": "1", "nominal": 2.0, "fitted": 2.23, "sd": 0.01, "sigmas": 2.3, "bent": 2.41, "bent_sigmas": 4.1, "is_evidence": true},
+            {"name": "zero", "unit": "mm", "nominal": 0.1, "fitted": 0.12, "sd": 0.02, "sigmas": 0.4, "bent": 0.1, "bent_sigmas": 0.0, "is_evidence": false},
         ],
     }))
     .expect("a diagnosis")
@@ -148,32 +152,31 @@ fn candidate(effects: &[&str], probability: f64, closed: f64, values: Value) -> 
     let left = 8.0 * (1.0 - closed);
     json!({
         "effects": effects, "probability": probability, "score": 100.0, "gap_before": 8.0, "gap_after": left,
-        "left": left, "closed": closed, "closed_ci": [closed - 0.02, closed], "is_confirmed": true,
+        "left": left, "at_bound": false, "closed": closed, "closed_ci": [closed - 0.02, closed], "is_confirmed": true,
         "parameters": {}, "parameter_values": values,
     })
 }
 
 fn width(effect: &str) -> Value {
-    json!([{"effect": effect, "name": "w", "unit": "mm", "value": 0.5123, "sd": 0.0041, "interval": [0.5042, 0.5203]}])
-}
-
-fn strings(names: &[&str]) -> Vec<String> {
-    names.iter().map(|name| (*name).to_owned()).collect()
+    json!([{"effect": effect, "name": "w", "unit": "mm", "value": 0.5123, "sd": 0.0041, "interval": [0.5042, 0.5203],
+        "is_form": false, "at_bound": false}])
 }
 
 /// A diagnosis that names effects, with rivals that are nearly as probable.
-fn naming(verdict: VerdictKind, name: &str, named: &[&str], rivals: &[&str]) -> Diagnosis {
-    let closed = if verdict == VerdictKind::Partial { 0.8 } else { 0.999 };
+fn naming(name: &str, rivals: &[&str]) -> Diagnosis {
+    let answer = answer(name);
+    let closed = if answer.verdict() == VerdictKind::Partial { 0.8 } else { 0.999 };
+    let named = answer.named();
+    let named: Vec<&str> = named.iter().map(String::as_str).collect();
     let probability = if rivals.is_empty() { 0.97 } else { 0.55 };
-    let mut candidates = vec![candidate(named, probability, closed, width(named[0]))];
+    let mut candidates = vec![candidate(&named, probability, closed, width(named[0]))];
     candidates.extend(rivals.iter().map(|rival| candidate(&[*rival], 0.42, closed, width(rival))));
     candidates.push(candidate(&["unknown"], 0.03, 0.0, json!([])));
     Diagnosis {
-        named: strings(named),
-        ambiguous: strings(&[named, rivals].concat()),
+        ambiguous: [&named, rivals].concat().into_iter().map(str::to_owned).collect(),
         candidates: from_value(json!(candidates)).expect("candidates"),
         stabilities: from_value(json!([{"effect": named[0], "stability": 0.93}])).expect("one"),
-        ..answer(verdict, name)
+        ..answer
     }
 }
 
@@ -187,7 +190,7 @@ fn one_missing() -> Diagnosis {
         }))
         .expect("a transfer"),
         next_experiment: next_experiment(14.0),
-        ..naming(VerdictKind::Effect, "one missing", &[PLAY], &[LOOP])
+        ..naming("one missing", &[LOOP])
     }
 }
 
@@ -200,80 +203,50 @@ fn next_experiment<T: serde::de::DeserializeOwned>(minutes: f64) -> Option<T> {
 }
 
 fn agrees() -> Diagnosis {
-    let limit = |effect: &str, strength: Option<f64>| json!({"effect": effect, "parameter": "w", "strength": strength, "unit": "mm"});
+    let limit = |effect: &str, strength: Option<f64>| json!({"effect": effect, "parameter": "w", "strength": strength, "unit": "mm", "others": {}});
     Diagnosis {
         detection_limits: from_value(json!([limit(PLAY, Some(0.0123)), limit(LOOP, None)]))
             .expect("limits"),
-        ..answer(VerdictKind::NoGap, "agrees")
+        ..answer("agrees")
     }
 }
 
-fn wrong(name: &str, gross: Value) -> Diagnosis {
-    let gross: Gross = from_value(gross).expect("an error of the record");
+fn wrong(name: &str) -> Diagnosis {
     let with_it = json!([candidate(&["scale of y1_mm"], 0.9, 0.999, json!([]))]);
-    Diagnosis {
-        candidates: from_value(with_it).expect("candidates"),
-        gross: vec![gross],
-        ..answer(VerdictKind::Record, name)
-    }
+    Diagnosis { candidates: from_value(with_it).expect("candidates"), ..answer(name) }
 }
 
 /// Diagnoses with every kind of answer, by the name of the sentence.
 fn answers() -> Vec<(&'static str, Diagnosis)> {
-    use VerdictKind::{Effect, NoGap, Parameters, Partial, Unknown};
-    let mut fits_worse = naming(Effect, "one missing, fits worse than it tests", &[PLAY], &[]);
+    let mut fits_worse = naming("one missing, fits worse than it tests", &[]);
     (fits_worse.candidates[0].left, fits_worse.candidates[0].gap_after) = (0.9, 0.1);
-    let mut faint = answer(Parameters, "more than noise, nothing found");
+    let mut faint = answer("more than noise, nothing found");
     faint.parameters.clear();
     faint.gap.retuned = 0.08;
     let proposed = json!({
         "stage": "lag", "channel": "y1_mm", "equation": "y1_mm += 0.31 x_V^2", "terms": [], "signals": [],
         "time_scales_s": [8.0, 68.0], "initial": "at rest", "closes_held": 0.9, "closes_test": 0.88,
-        "acts": "output y1_mm", "random": false, "log_odds": 12.0, "sentence": "",
+        "acts": "output y1_mm", "random": false, "log_odds": 12.0, "predicted": 0.8, "sentence": "",
     });
-    let tie = Diagnosis {
-        tied: strings(&[LOOP]),
-        next_experiment: next_experiment(1.5),
-        ..naming(Effect, "tie", &[PLAY], &[LOOP])
-    };
-    let two = |name, tied: &[&str]| Diagnosis {
-        tied: strings(tied),
-        ..naming(Effect, name, &[PLAY, LAG], &[])
-    };
-    let scaled = json!({
-        "what": "scale", "column": "y1_mm", "unit": "mm", "factor": 1.25,
-        "sentence": "y1_mm looks 1.250 times too large", "hint": "check the gain of the amplifier",
-    });
-    let copied = json!({
-        "what": "copied", "column": "y1_mm", "unit": "mm", "factor": 0.5,
-        "sentence": "y1_mm is a copy of y0_mm (0.5 times it, noise and all)",
-        "hint": "check which channels the recorder wrote into the two columns",
-    });
-    let rig_file = json!({
-        "what": "parameter", "parameter": "gain", "unit": "1", "says": 2.0, "found": 4.0,
-        "sentence": "gain is 4 on the rig, and 2 in the simulator", "hint": "correct the parameter of the simulator, or the setting of the rig",
-    });
+    let tie = Diagnosis { next_experiment: next_experiment(1.5), ..naming("tie", &[LOOP]) };
     let with_best = |name, closed| Diagnosis {
         candidates: from_value(json!([candidate(&[PLAY], 0.2, closed, json!([]))])).expect("one"),
-        ..answer(Unknown, name)
+        ..answer(name)
     };
     vec![
         ("agrees", agrees()),
-        (
-            "agrees, one effect faint",
-            Diagnosis { faint: strings(&[PLAY]), ..answer(NoGap, "agrees, one effect faint") },
-        ),
-        ("re-tuned", answer(Parameters, "re-tuned")),
+        ("agrees, one effect faint", answer("agrees, one effect faint")),
+        ("re-tuned", answer("re-tuned")),
         ("more than noise, nothing found", faint),
         ("one missing", one_missing()),
         ("one missing, fits worse than it tests", fits_worse),
         ("tie", tie),
-        ("two missing", two("two missing", &[])),
+        ("two missing", naming("two missing", &[])),
         (
             "two missing, one tied, a third faint",
-            two("two missing, one tied, a third faint", &[LOOP]),
+            naming("two missing, one tied, a third faint", &[]),
         ),
-        ("mostly", naming(Partial, "mostly", &[PLAY, LAG], &[])),
+        ("mostly", naming("mostly", &[])),
         ("unknown", with_best("unknown", 0.05)),
         (
             "unknown, with a proposal",
@@ -282,9 +255,9 @@ fn answers() -> Vec<(&'static str, Diagnosis)> {
                 ..with_best("unknown, with a proposal", 0.05)
             },
         ),
-        ("wrong record", wrong("wrong record", scaled)),
-        ("copied column", wrong("copied column", copied)),
-        ("wrong rig file", wrong("wrong rig file", rig_file)),
+        ("wrong record", wrong("wrong record")),
+        ("copied column", wrong("copied column")),
+        ("wrong rig file", wrong("wrong rig file")),
         ("parameters at their bounds", with_best("parameters at their bounds", 0.999)),
         ("too short", with_best("too short", 0.999)),
         ("too few rows", with_best("too few rows", 0.999)),
@@ -311,7 +284,7 @@ fn page(diagnosis: &Diagnosis) -> String {
     let mut evidence = evidence.clone();
     evidence.best = evidence.retuned.clone();
     let mut implementations = Vec::new();
-    if diagnosis.named.iter().any(|name| name == PLAY) {
+    if diagnosis.named().iter().any(|name| name == PLAY) {
         evidence.best.effects = vec![(0, vec![0.5123, 0.0])];
         implementations.push(implementation());
     }

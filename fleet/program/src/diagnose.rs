@@ -141,12 +141,14 @@ fn row(
         Err(why) => (None, Some(format!("{why:#}"))),
     };
     let diagnosis = diagnosis.as_ref();
-    let kind = diagnosis.map(|d| serde_json::to_value(d.verdict)).transpose()?;
-    let named = diagnosis.map(|d| d.named.join(" "));
+    let kind = diagnosis.map(|d| serde_json::to_value(d.verdict())).transpose()?;
+    let named = diagnosis.map(|d| d.named().join(" "));
     let best = diagnosis.and_then(|d| {
-        d.candidates.iter().find(|candidate| !d.named.is_empty() && candidate.effects == d.named)
+        d.candidates
+            .iter()
+            .find(|candidate| !candidate.effects.is_empty() && candidate.effects == d.named())
     });
-    let left = diagnosis.and_then(|d| d.unexplained.as_ref().map(|left| left.share));
+    let left = diagnosis.and_then(|d| d.answer.unexplained().map(|left| left.share));
     let left = left.or(best.map(|best| 1.0 - best.closed));
     let columns: Vec<(&str, ArrayRef)> = vec![
         ("site", text(Some(name[0].clone()))),

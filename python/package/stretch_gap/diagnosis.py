@@ -19,6 +19,9 @@ from .outputs import replaceable
 from .recordings import Array, unknown
 from .simulator import Asked
 
+SCHEMA = 2
+"""Version of the JSON of a diagnosis."""
+
 SHOWN = 5
 """Largest number of rows of each list that `repr` shows."""
 
@@ -95,13 +98,18 @@ class Diagnosis:
         ------
         json.JSONDecodeError
             If the text is not JSON.
+        StretchError
+            If another version of the package wrote the text.
 
         Examples
         --------
         >>> stretch_gap.Diagnosis.from_json(found.to_json()).named
         ['output.delay']
         """
-        return Diagnosis(json.loads(text))
+        answer = json.loads(text)
+        if not isinstance(answer, dict) or answer.get("schema") != SCHEMA:
+            raise StretchError(f"this is not a diagnosis of schema {SCHEMA}, which this release reads: diagnose again")
+        return Diagnosis(answer)
 
     @property
     def verdict(self) -> str:
@@ -136,16 +144,13 @@ class Diagnosis:
         - `"agrees"`: simulator and recording agree within the noise.
         - `"retuned"`: they agree after re-tuning.
         - `"faint"`: the gap is larger than noise usually is, but too small to name a cause.
-        - `"missing"`: effects are missing; with them only noise is left.
-        - `"partly"`: effects are missing; with them more than noise is left.
+        - `"missing"`: effects are missing; the key `rest` exists if more than noise is left with them.
         - `"wrong_record"`: the recording itself is wrong.
         - `"unknown"`: no effect of the list explains the gap.
         - `"at_bounds"`: parameters are at the ends of their tolerances, and beyond them would explain as much as effects do.
         - `"too_little"`: the recording is not sufficient to name an effect.
-
-        The dict is empty if an older version wrote the diagnosis.
         """
-        return dict(self._answer.get("answer") or {})
+        return dict(self._answer["answer"])
 
     @property
     def not_examined(self) -> list[str]:
@@ -270,7 +275,7 @@ class Diagnosis:
         the named one first), `titles` (their kinds in words), `property` (`late` or `loop`), `place`, and `range` and `unit`
         (least and greatest value of the property).
         """
-        effects = (self._answer.get("answer") or {}).get("effects", [])
+        effects = self._answer["answer"].get("effects", [])
         return [effect["family"] for effect in effects if effect.get("family")]
 
     @property
@@ -308,7 +313,12 @@ class Diagnosis:
     @property
     def notes(self) -> list[str]:
         """Notes, list of str: changes that were made to the recordings, limits of the data, and columns to check."""
-        return list(self._answer["notes"])
+        return [note["text"] for note in self._answer["notes"]]
+
+    @property
+    def note_codes(self) -> list[str]:
+        """What each of the `notes` is about, list of str in the same order, for programs: `"budget_spent"`, for example."""
+        return [note["code"] for note in self._answer["notes"]]
 
     @property
     def model_runs(self) -> int:
@@ -794,7 +804,7 @@ def diagnose(
 
 def _corrected(answer: Mapping[str, Any]) -> dict[str, float]:
     """Return the parameters that are far outside their tolerances, if nothing else is wrong, with the values that fit."""
-    errors = (answer.get("answer") or {}).get("errors", [])
+    errors = answer["answer"].get("errors", [])
     values = {one["parameter"]: one["found"] for one in errors if one["what"] == "parameter"}
     return values if len(values) == len(errors) else {}
 
@@ -858,7 +868,7 @@ def run(
                 "values that cannot be simulated"
             ) from asked.refusal
     answer = json.loads(text)
-    answer["notes"] = notes + answer["notes"]
+    answer["notes"] = [{"code": "recording", "text": note} for note in notes] + answer["notes"]
     again = Again(fixed, asked, how, session, nominal, off) if fixed or _corrected(answer) else None
     return Diagnosis(answer, page, curves, functions, trial, session, again, earlier)
 

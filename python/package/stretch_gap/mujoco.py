@@ -296,7 +296,7 @@ class Problem:
 
         given: dict[str, Any] = {"stages": self.stages, "parameters": self.parameters, "effects": self.effects}
         made = diagnose(self.simulator, self.trials, **{**given, **more})
-        made._answer["notes"] = self.notes + made._answer["notes"]
+        made._answer["notes"] = [{"code": "recording", "text": note} for note in self.notes] + made._answer["notes"]
         return made
 
 

@@ -70,7 +70,7 @@ impl Found {
             caption: table.caption.clone(),
             candidates: table.into(),
             sentence: diagnosis.sentence,
-            notes: diagnosis.notes.into_iter().map(String::from).collect(),
+            notes: diagnosis.notes.iter().map(ToString::to_string).collect(),
             seconds: self.examined.diagnosis.runtime_s,
             no_rig: self.examined.fix.as_ref().err().map(ToString::to_string),
         }

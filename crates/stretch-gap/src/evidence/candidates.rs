@@ -44,11 +44,9 @@ pub struct Candidate {
     /// Excess with the effects.
     pub gap_after: f64,
     /// Excess that the set leaves: the larger of those on fitted and test trials.
-    #[serde(default)]
     pub left: f64,
     /// Whether the strongest effect of the set is at an end of its range, which makes a cause
     /// outside the catalogue more probable. [`EffectValue::at_bound`] tells of every effect.
-    #[serde(default)]
     pub at_bound: bool,
     /// Closed-gap fraction.
     pub closed: f64,
@@ -107,14 +105,11 @@ pub struct EffectValue {
     /// One standard deviation, from the curvature of the fit with one observation per 0.5 s.
     pub sd: f64,
     /// 95 % interval of the value, within the range that was searched.
-    #[serde(default)]
     pub interval: [f64; 2],
     /// Whether the parameter describes only the form of the effect, not its strength.
-    #[serde(default)]
     pub is_form: bool,
     /// Whether the value is a strength at an end of its range. The effect then probably compensates
     /// for another cause.
-    #[serde(default)]
     pub at_bound: bool,
 }
 
@@ -130,14 +125,12 @@ pub struct ParameterShift {
     /// Value in the final model.
     pub fitted: f64,
     /// One standard deviation of the fitted value, as for an [`EffectValue`].
-    #[serde(default)]
     pub sd: f64,
     /// Distance of the fitted from the nominal value, in tolerances.
     pub sigmas: f64,
     /// Value after re-tuning without effects.
     pub bent: f64,
     /// Distance of `bent` from the nominal value, in tolerances.
-    #[serde(default)]
     pub bent_sigmas: f64,
     /// Whether the value is evidence by itself. It is not if other parameters can compensate for
     /// it.

@@ -89,7 +89,6 @@ pub struct DetectionLimit {
     /// Unit of the value.
     pub unit: String,
     /// Values of the other parameters.
-    #[serde(default)]
     pub others: BTreeMap<String, f64>,
     /// Value of the parameter at which something would be seen with probability 0.9, although
     /// another effect may be named in its place.

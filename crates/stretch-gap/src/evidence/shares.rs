@@ -34,7 +34,6 @@ pub struct EffectShare {
     pub closes: f64,
     /// Excess that the effect closes in the stage in which it closes most, in variances of the
     /// noise; the larger of the values on fitted and on test trials.
-    #[serde(default)]
     pub closes_excess: f64,
     /// Whether one of its parameters reached an end of its range. The effect then probably
     /// compensates for another cause.

@@ -55,35 +55,16 @@ const LEFT: f64 = 0.1;
 const ALIKE: f64 = 0.01;
 
 /// Number of starts of re-tuning, and how many of them ended at the best result.
-///
-/// ```
-/// use stretch_gap::Starts;
-/// assert_eq!(Starts { tried: 4, agreed: 3 }.note().as_deref(), Some(
-///     "re-tuning ends at different values: 3 of 4 starts within the tolerances reached the best fit, with which the diagnosis continues; narrow the tolerances of the parameters if you can"
-/// ));
-/// assert_eq!(Starts { tried: 1, agreed: 1 }.note(), None);
-/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Starts {
     /// Number of points within the tolerances from which parameters were re-tuned. It is 1 if re-tuning from the
-    /// parameters as shipped was not repeated, and 0 if an older version wrote the diagnosis.
+    /// parameters as shipped was not repeated.
     pub tried: usize,
     /// How many of them ended at the best result.
     pub agreed: usize,
 }
 
 impl Starts {
-    /// Returns a note that the starts disagree; `None` if they agree.
-    pub fn note(&self) -> Option<String> {
-        let Self { tried, agreed } = self;
-        (agreed < tried).then(|| {
-            format!(
-                "re-tuning ends at different values: {agreed} of {tried} starts within the tolerances reached the best fit, with which \
-                 the diagnosis continues; narrow the tolerances of the parameters if you can"
-            )
-        })
-    }
-
     /// Of the results for two groups of stages, returns the one whose starts disagree more.
     fn beside(self, other: Self) -> Self {
         let misses = |s: &Self| (s.tried - s.agreed, s.tried);

@@ -78,7 +78,6 @@ pub struct Proposed {
     pub log_odds: f64,
     /// Share of the remaining gap that many terms of the library predict together on held-out
     /// samples.
-    #[serde(default, rename = "foretold")]
     pub predicted: f64,
     /// All of this in one sentence.
     pub sentence: String,

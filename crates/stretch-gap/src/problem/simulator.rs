@@ -95,18 +95,6 @@ pub struct ModelRuns {
     pub is_spent: bool,
 }
 
-impl ModelRuns {
-    /// Returns a note if the search was cut short.
-    pub(crate) fn note(&self) -> Option<String> {
-        let budget = self.budget.filter(|_| self.is_spent)?;
-        Some(format!(
-            "the budget of {budget} model runs was spent before the search was over ({} were made): the answer is based on what was \
-             fitted until then; allow more runs to continue the search",
-            self.count
-        ))
-    }
-}
-
 /// A simulator and the measurements that it is compared with.
 ///
 /// Every stage is run alone on its measured input (teacher forcing), so that the error of one stage

@@ -1,7 +1,7 @@
-//! The result of a diagnosis. Its serialised form is `diagnosis.json`, schema 1.
+//! The result of a diagnosis. Its serialised form is `diagnosis.json`, schema 2.
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 
 use crate::{
     evidence::{
@@ -19,6 +19,9 @@ use crate::{
     record::gross::Gross,
     verdict::{answer::Answer, note::Note},
 };
+
+/// Version of the serialised form of a [`Diagnosis`].
+pub(crate) const SCHEMA: u32 = 2;
 
 /// The kinds of answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -90,21 +93,20 @@ pub struct NextExperiment {
 /// The result of a diagnosis.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Diagnosis {
-    /// Version of this schema: 1.
+    /// Version of this schema: 2.
+    #[serde(deserialize_with = "supported")]
     pub schema: u32,
-    /// The kind of answer.
-    pub verdict: VerdictKind,
     /// Whether a gauge was diagnosed alone, so that there is neither a rig nor a simulator of one; left
     /// out if not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub gauge_alone: bool,
-    /// The answer with its numbers; none if an older version wrote the diagnosis.
-    #[serde(default)]
-    pub answer: Option<Answer>,
+    /// The answer with its numbers. A file also has what follows from it.
+    #[serde(flatten, serialize_with = "write_answer", deserialize_with = "read_answer")]
+    #[schemars(with = "Written")]
+    pub answer: Answer,
     /// The answer in plain sentences.
     pub sentence: String,
     /// Effects that were not examined because their runs failed.
-    #[serde(default)]
     pub not_examined: Vec<String>,
     /// Effects that were not examined because the budget of runs was used up; none if it was not.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -116,30 +118,11 @@ pub struct Diagnosis {
     /// is `partial` or `unknown`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub not_fitted: Vec<String>,
-    /// Names of the missing effects, the strongest first. Empty unless the verdict is `effect` or
-    /// `partial`.
-    pub named: Vec<String>,
-    /// Effects that may be missing instead of a named one: those in the smallest collection of sets
-    /// that holds 95 % of the probability.
-    #[serde(default)]
-    pub tied: Vec<String>,
-    /// Effects that were found but close less than `least_gap`.
-    #[serde(default)]
-    pub faint: Vec<String>,
     /// Excess from which a gap is relevant, in multiples of the noise variance. A further named
     /// effect must close at least this much.
-    #[serde(default)]
     pub least_gap: f64,
-    /// What a partial answer does not explain.
-    #[serde(default)]
-    pub unexplained: Option<Unexplained>,
     /// The proposed term, if a gap is left that the effects of the catalogue do not explain.
-    #[serde(default)]
     pub proposed: Option<Proposed>,
-    /// Errors of the recording or of the rig file: all that the columns alone show, or one error
-    /// with those that the data cannot distinguish from it. Empty unless the verdict is `record`.
-    #[serde(default)]
-    pub gross: Vec<Gross>,
     /// The effects in the smallest collection of sets that holds 95 % of the probability: the data
     /// cannot distinguish them.
     pub ambiguous: Vec<String>,
@@ -148,22 +131,17 @@ pub struct Diagnosis {
     pub candidates: Vec<Candidate>,
     /// What each effect of the best set closes of the gap on trials that were not fitted, the
     /// strongest first, whether named or not.
-    #[serde(default)]
     pub shares: Vec<EffectShare>,
     /// How certainly each effect of the compared sets belongs to the most probable set, the most
     /// certain first.
-    #[serde(default)]
     pub stabilities: Vec<EffectStability>,
     /// Size of the gap.
-    #[serde(default)]
     pub gap: Excess,
     /// Gap that 19 of 20 such recordings stay below if nothing is missing.
-    #[serde(default)]
     pub null_band: f64,
     /// Strength from which each effect of the catalogue would be named, in the catalogue's order.
     /// Empty if an effect is named, unless they were [requested](crate::Options::detection_limits),
     /// and empty if the recording is not sufficient to name an effect.
-    #[serde(default)]
     pub detection_limits: Vec<DetectionLimit>,
     /// Where the gap occurs.
     #[serde(rename = "where")]
@@ -171,7 +149,6 @@ pub struct Diagnosis {
     /// Nominal parameters before and after re-tuning.
     pub parameters: Vec<ParameterShift>,
     /// Which nominal parameters the data determine.
-    #[serde(default)]
     pub identifiability: Vec<Identified>,
     /// Error that the gap causes in a calibration.
     pub transfer: Option<Transfer>,
@@ -179,59 +156,110 @@ pub struct Diagnosis {
     pub next_experiment: Option<NextExperiment>,
     /// Observations and assumptions.
     pub notes: Vec<Note>,
-    /// Those of the notes that give a reason why a gap may exist although none was found.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub reservations: Vec<Note>,
     /// Rows that the diagnosis used, and rows that were read.
-    #[serde(default)]
     pub rows_used: RowsUsed,
     /// Number of simulations of one stage.
-    #[serde(default)]
     pub simulations: usize,
     /// Runs of a black-box simulator, if its runs are costly.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_runs: Option<ModelRuns>,
     /// How often the nominal parameters were re-tuned from other points within their tolerances,
     /// and how often the result was the same.
-    #[serde(default)]
     pub starts: Starts,
     /// Duration of the diagnosis, s.
     pub runtime_s: f64,
 }
 
+/// The answer as a file has it, with what follows from it.
+#[derive(Serialize, JsonSchema)]
+struct Written {
+    /// The kind of answer.
+    verdict: VerdictKind,
+    /// Names of the missing effects, the strongest first. Empty unless the verdict is `effect` or
+    /// `partial`.
+    named: Vec<String>,
+    /// Effects that may be missing instead of a named one: those in the smallest collection of sets
+    /// that holds 95 % of the probability.
+    tied: Vec<String>,
+    /// Effects that were found but close less than `least_gap`.
+    faint: Vec<String>,
+    /// What a partial answer does not explain.
+    unexplained: Option<Unexplained>,
+    /// Errors of the recording or of the rig file: all that the columns alone show, or one error
+    /// with those that the data cannot distinguish from it. Empty unless the verdict is `record`.
+    gross: Vec<Gross>,
+    /// The answer with its numbers.
+    answer: Answer,
+}
+
+fn write_answer<S: Serializer>(answer: &Answer, serializer: S) -> Result<S::Ok, S::Error> {
+    let written = Written {
+        verdict: answer.kind(),
+        named: answer.named(),
+        tied: answer.tied(),
+        faint: answer.faint().to_vec(),
+        unexplained: answer.unexplained().cloned(),
+        gross: answer.gross().to_vec(),
+        answer: answer.clone(),
+    };
+    written.serialize(serializer)
+}
+
+/// Reads the answer. What follows from it is not read.
+fn read_answer<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Answer, D::Error> {
+    #[derive(Deserialize)]
+    struct Read {
+        answer: Answer,
+    }
+    Read::deserialize(deserializer).map(|read| read.answer)
+}
+
+/// Reads the version of the schema. Any other version is refused.
+fn supported<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u32, D::Error> {
+    match u32::deserialize(deserializer)? {
+        SCHEMA => Ok(SCHEMA),
+        other => Err(D::Error::custom(format!(
+            "a diagnosis of schema {other}, and this release reads schema {SCHEMA}: diagnose again"
+        ))),
+    }
+}
+
 impl Diagnosis {
-    /// Whether simulator and rig agree, although more is left than the stated noise would leave in
-    /// 19 of 20 recordings. Either the noise is larger than stated, or something is missing that is
-    /// too small to name.
-    ///
-    /// ```
-    /// use stretch_gap::{Diagnosis, VerdictKind};
-    /// fn check(diagnosis: &Diagnosis) {
-    ///     let quieter = Diagnosis { null_band: f64::INFINITY, ..diagnosis.clone() };
-    ///     assert!(!quieter.is_faint());
-    ///     let unknown = Diagnosis { verdict: VerdictKind::Unknown, ..diagnosis.clone() };
-    ///     assert!(!unknown.is_faint());
-    /// }
-    /// ```
-    pub fn is_faint(&self) -> bool {
-        let agrees = matches!(self.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
-        agrees && self.gap.retuned > self.null_band
+    /// Returns the kind of the [answer](Self::answer).
+    pub fn verdict(&self) -> VerdictKind {
+        self.answer.kind()
+    }
+
+    /// Returns the names of the missing effects, in the order of the sentence.
+    pub fn named(&self) -> Vec<String> {
+        self.answer.named()
+    }
+
+    /// Returns the effects that the data cannot rule out, apart from the named ones.
+    pub fn rivals(&self) -> Vec<String> {
+        let named = self.named();
+        self.ambiguous.iter().filter(|name| !named.contains(name)).cloned().collect()
+    }
+
+    /// Returns the notes that give a reason why a gap may exist although none was found.
+    pub fn reservations(&self) -> impl Iterator<Item = &Note> {
+        self.notes.iter().filter(|note| note.code.is_reservation())
     }
 
     /// Whether simulator and rig agree and no note gives a reason why a gap may exist nevertheless.
     ///
     /// ```
-    /// use stretch_gap::{Diagnosis, VerdictKind};
+    /// use stretch_gap::{Answer, Diagnosis, Note, NoteCode};
     /// fn check(diagnosis: &Diagnosis) {
-    ///     let agrees = Diagnosis { verdict: VerdictKind::NoGap, reservations: Vec::new(), ..diagnosis.clone() };
+    ///     let answer = Answer::Agrees { small: Vec::new() };
+    ///     let mut agrees = Diagnosis { answer, notes: Vec::new(), ..diagnosis.clone() };
     ///     assert!(agrees.is_agreement());
-    ///     let implausible = vec!["the noise of speed_mps is implausible".to_owned().into()];
-    ///     assert!(!Diagnosis { reservations: implausible, ..agrees }.is_agreement());
+    ///     agrees.notes.push(Note::new(NoteCode::ImplausibleNoise, "the noise of speed_mps is implausible"));
+    ///     assert!(!agrees.is_agreement());
     /// }
     /// ```
     pub fn is_agreement(&self) -> bool {
-        let agrees = matches!(self.verdict, VerdictKind::NoGap | VerdictKind::Parameters);
-        agrees && self.reservations.is_empty()
+        self.answer.agrees() && self.reservations().next().is_none()
     }
 
     /// Renames every effect, in lists, notes and sentences.
@@ -240,12 +268,11 @@ impl Diagnosis {
     /// use stretch_gap::Diagnosis;
     /// fn check(diagnosis: &mut Diagnosis) {
     ///     diagnosis.rename(&|name| name.to_uppercase());
-    ///     assert!(diagnosis.named.iter().all(|name| diagnosis.sentence.contains(name)));
+    ///     assert!(diagnosis.named().iter().all(|name| diagnosis.sentence.contains(name)));
     /// }
     /// ```
     pub fn rename(&mut self, rename: &dyn Fn(&str) -> String) {
-        let lists = [&mut self.named, &mut self.tied, &mut self.faint, &mut self.ambiguous];
-        let names = lists.into_iter().flatten().chain(&mut self.not_examined);
+        let names = self.ambiguous.iter_mut().chain(&mut self.not_examined);
         let names = names.chain(self.cut_short.iter_mut().flatten()).chain(&mut self.not_fitted);
         let names = names.chain(self.candidates.iter_mut().flat_map(|c| &mut c.effects));
         let names = names.chain(self.shares.iter_mut().map(|s| &mut s.effect));
@@ -257,8 +284,8 @@ impl Diagnosis {
         names.for_each(|name| *name = rename(name));
         let values = self.candidates.iter_mut().flat_map(|c| &mut c.parameters);
         values.for_each(|value| value.effect = rename(&value.effect));
-        self.answer.iter_mut().for_each(|answer| answer.rename(rename));
-        self.notes.iter_mut().chain(&mut self.reservations).for_each(|note| note.rename(rename));
+        self.answer.rename(rename);
+        self.notes.iter_mut().for_each(|note| note.rename(rename));
         self.sentence = self.headline();
     }
 

@@ -16,104 +16,78 @@
 
 use crate::{
     evidence::{
-        candidates::Candidate,
-        gathered::Excess,
+        candidates::{Candidate, multiple},
+        gathered::{Evidence, Excess, StageEvidence},
+        localise,
         probability::{Posterior, Standing, allowed, names},
         sanity::{AtBounds, Sanity},
         shares::EffectShare,
     },
-    problem::thresholds::Thresholds,
-    verdict::{coverage::TooLittle, diagnosis::VerdictKind, naming::Naming},
+    problem::{simulator::Simulator, thresholds::Thresholds},
+    record::gross::Gross,
+    verdict::{
+        answer::{Answer, Closed, MissingEffect},
+        coverage::TooLittle,
+        diagnosis::{Unexplained, VerdictKind},
+        family::EffectFamily,
+        naming::Naming,
+    },
 };
 
-/// The facts that the verdict depends on.
-#[derive(Debug, Clone, Copy)]
+/// Smallest share of the gap for which an effect that is not named is reported.
+const LEAST_PART: f64 = 0.05;
+/// Number of slices of the unexplained gap that are reported.
+const REPORTED_SLICES: usize = 3;
+
+/// The facts that the answer depends on.
+#[derive(Clone, Copy)]
 pub(crate) struct Case<'a> {
-    pub(crate) gap: Excess,
+    pub(crate) simulator: &'a dyn Simulator,
+    pub(crate) evidence: &'a Evidence,
     pub(crate) posterior: &'a Posterior,
     /// The most probable first. The set without effects follows the sets with effects.
     pub(crate) candidates: &'a [Candidate],
     /// Share of each effect of the best set, the strongest first.
     pub(crate) shares: &'a [EffectShare],
     pub(crate) sanity: &'a Sanity,
-    /// Whether an error of the recording or of the rig file is more probable than all sets of
+    /// Errors of the recording or of the rig file, if they are more probable than all sets of
     /// effects.
-    pub(crate) is_record: bool,
+    pub(crate) gross: &'a [Gross],
+    /// Gap that noise alone does not exceed in 19 of 20 recordings.
+    pub(crate) null_band: f64,
     /// The reason why the recording is not sufficient to name an effect, if it is not.
     pub(crate) too_little: Option<TooLittle>,
+    pub(crate) seed: u64,
 }
 
-/// The verdict with the names of effects.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Judged {
-    pub(crate) kind: VerdictKind,
-    /// The verdict if nothing overrode it.
-    pub(crate) seen: VerdictKind,
-    /// The reason for which the verdict was overridden, if it was.
-    pub(crate) overruled: Option<Overruled>,
-    /// The names that would be reported if nothing overrode the verdict.
-    pub(crate) seen_naming: Naming,
-}
-
-impl Judged {
-    /// Returns the names of the verdict; empty if it is overridden.
-    pub(crate) fn naming(&self) -> Naming {
-        match self.overruled {
-            Some(_) => Naming::default(),
-            None => self.seen_naming.clone(),
-        }
+/// Returns the answer of a case.
+pub(crate) fn judge(case: &Case<'_>, thresholds: &Thresholds) -> Answer {
+    let kind = most_probable(case, thresholds);
+    let seen = case.answer(kind, case.naming(kind, thresholds));
+    if let Some(found) = at_bounds(case).filter(|_| kind != VerdictKind::Record) {
+        return AtBounds::answer(found, case.simulator, seen);
     }
-}
-
-/// The reason for which a verdict is overridden.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Overruled {
-    /// The parameters of a stage do not fit within their tolerances.
-    AtBounds(AtBounds),
-    /// The recording is not sufficient to name an effect.
-    TooLittle(TooLittle),
-}
-
-/// Returns the verdict of a case.
-pub(crate) fn judge(case: &Case<'_>, thresholds: &Thresholds) -> Judged {
-    use VerdictKind::{Effect, Partial, Record, Unknown};
-    if case.is_record {
-        let seen_naming = Naming::default();
-        return Judged { kind: Record, seen: Record, overruled: None, seen_naming };
-    }
-    let seen = seen(case, thresholds);
     // An unknown cause may be the most probable only because the recording is short.
-    let needs_more = matches!(seen, Effect | Partial | Unknown);
-    let too_little = case.too_little.filter(|_| needs_more).map(Overruled::TooLittle);
-    let overruled = at_bounds(case).or(too_little);
-    let kind = if overruled.is_some() { Unknown } else { seen };
-    Judged { kind, seen, overruled, seen_naming: naming(case, seen, thresholds) }
-}
-
-/// Returns the names that belong to a verdict.
-fn naming(case: &Case<'_>, seen: VerdictKind, thresholds: &Thresholds) -> Naming {
-    let all = Naming::of(case.candidates, case.shares, thresholds);
-    match seen {
-        VerdictKind::Effect | VerdictKind::Partial => all,
-        // Effects that are probable but small are reported below the headline.
-        VerdictKind::Parameters | VerdictKind::NoGap
-            if case.posterior.effects() > case.posterior.nothing() =>
-        {
-            Naming { faint: [all.named, all.faint].concat(), ..Naming::default() }
-        }
-        _ => Naming::default(),
+    let needs_more =
+        matches!(kind, VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown);
+    match case.too_little.filter(|_| needs_more) {
+        Some(why) => Answer::TooLittle { why },
+        None => seen,
     }
 }
 
-/// Returns the verdict of the posterior and the size of the gap, before checks override it.
-fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
+/// Returns the kind of answer that the posterior and the size of the gap support, before checks
+/// override it.
+pub(super) fn most_probable(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
     let (nothing, effects) = (case.posterior.nothing(), case.posterior.effects());
-    let Excess { raw, retuned, .. } = case.gap;
+    let Excess { raw, retuned, .. } = case.evidence.gap;
     let first = case.posterior.sets.iter().find(|w| !w.hypothesis.effects.is_empty());
     // A set that predicts trials that were not fitted no better than the simulator without it makes
     // up for something else.
     let is_useless = case.candidates.first().is_some_and(|c| c.closed <= 0.0);
-    if case.posterior.unknown >= nothing.max(effects) {
+    if !case.gross.is_empty() {
+        VerdictKind::Record
+    } else if case.posterior.unknown >= nothing.max(effects) {
         VerdictKind::Unknown
     } else if names([effects, nothing, case.posterior.unknown], retuned, thresholds)
         && let Some(first) = first
@@ -133,194 +107,159 @@ fn seen(case: &Case<'_>, thresholds: &Thresholds) -> VerdictKind {
     }
 }
 
-fn at_bounds(case: &Case<'_>) -> Option<Overruled> {
+/// Returns the parameters at the ends of their tolerances, if they override the answer.
+fn at_bounds<'a>(case: &Case<'a>) -> Option<&'a AtBounds> {
     let found = case.sanity.at_bounds.as_ref()?;
     // The effects are kept if they leave less than free parameters would.
     let is_effect = found.rivals.is_some_and(|(effects, loose)| loose > effects);
-    (!is_effect).then(|| Overruled::AtBounds(found.clone()))
+    (!is_effect).then_some(found)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{
-        evidence::probability::Weighed, fit::hypothesis::Hypothesis, problem::simulator::Model,
-    };
-    use VerdictKind::{Effect, NoGap, Parameters, Partial, Record, Unknown};
-    use std::collections::BTreeMap;
+impl AtBounds {
+    /// Returns the answer that parameters are at the ends of their tolerances.
+    pub(super) fn answer(&self, simulator: &dyn Simulator, otherwise: Answer) -> Answer {
+        let name = |p: &usize| simulator.parameters()[*p].name.clone();
+        Answer::AtBounds {
+            stage: simulator.stages()[self.stage].name.clone(),
+            parameters: self.ended.iter().map(name).collect(),
+            left: multiple(self.left),
+            otherwise: Box::new(otherwise),
+        }
+    }
+}
 
-    static SOUND: Sanity =
-        Sanity { left: Vec::new(), allowed: 0.1, at_bounds: None, implausible: Vec::new() };
-
-    fn candidate(effects: &[&str], probability: f64) -> Candidate {
-        Candidate {
-            effects: effects.iter().map(|e| (*e).to_owned()).collect(),
-            probability,
-            score: 100.0,
-            gap_before: 10.0,
-            gap_after: 0.1,
-            left: 0.1,
-            at_bound: false,
-            closed: 0.99,
-            closed_ci: [0.98, 1.0],
-            is_confirmed: true,
-            by_name: BTreeMap::new(),
-            parameters: Vec::new(),
+impl Case<'_> {
+    /// Returns the names that belong to a kind of answer.
+    fn naming(&self, kind: VerdictKind, thresholds: &Thresholds) -> Naming {
+        let all = Naming::of(self.candidates, self.shares, thresholds);
+        match kind {
+            VerdictKind::Effect | VerdictKind::Partial => all,
+            // Effects that are probable but small are reported below the headline.
+            VerdictKind::Parameters | VerdictKind::NoGap
+                if self.posterior.effects() > self.posterior.nothing() =>
+            {
+                Naming { faint: [all.named, all.faint].concat(), ..Naming::default() }
+            }
+            _ => Naming::default(),
         }
     }
 
-    /// A posterior with the given probabilities of play, of no effect, and of a cause outside the
-    /// catalogue; `left` is the gap that play leaves.
-    fn posterior(play: f64, nothing: f64, unknown: f64, left: f64) -> Posterior {
-        let set = |effects: &[usize], left: f64, probability: f64| Weighed {
-            hypothesis: Hypothesis {
-                effects: effects.into(),
-                model: Model::default(),
-                misfits: Vec::new(),
-                effect_sd: BTreeMap::new(),
-                parameter_sd: Vec::new(),
-                score: 0.0,
-            },
-            standing: Standing { score: 0.0, left, is_at_bound: false, is_nothing: false },
-            probability,
-        };
-        Posterior {
-            sets: vec![set(&[0], left, play), set(&[], 10.0, nothing)],
-            unknown,
-            function: None,
-        }
-    }
-
-    /// Judges a gap (as shipped, re-tuned, and with the best set) with the given probabilities.
-    fn judged(gap: [f64; 3], probabilities: [f64; 3], change: impl Fn(&mut Case<'_>)) -> Judged {
-        let [raw, retuned, left] = gap;
-        let [play, nothing, unknown] = probabilities;
-        let candidates = [candidate(&["play"], play), candidate(&[], nothing)];
-        let mut case = Case {
-            gap: Excess { raw, retuned, left },
-            posterior: &posterior(play, nothing, unknown, left),
-            candidates: &candidates,
-            shares: &[],
-            sanity: &SOUND,
-            is_record: false,
-            too_little: None,
-        };
-        change(&mut case);
-        judge(&case, &Thresholds::frozen())
-    }
-
-    /// Every row of the module's table from `unknown` on.
-    #[test]
-    fn each_row_has_its_verdict() {
-        for (gap, probabilities, expected) in [
-            ([20.0, 10.0, 0.1], [0.9, 0.0, 0.1], Effect),
-            ([20.0, 10.0, 3.0], [0.6, 0.0, 0.4], Partial),
-            ([20.0, 10.0, 8.0], [0.2, 0.0, 0.8], Unknown),
-            ([20.0, 10.0, 10.0], [0.0, 0.1, 0.9], Unknown),
-            ([20.0, 0.04, 0.01], [0.9, 0.1, 0.0], Parameters),
-            ([20.0, 0.05, 0.05], [0.1, 0.8, 0.1], Parameters),
-            // without a free parameter nothing can be re-tuned
-            ([0.15, 0.15, 0.15], [0.1, 0.8, 0.1], NoGap),
-            ([0.04, 0.04, 0.04], [0.1, 0.8, 0.1], NoGap),
-        ] {
-            let verdict = judged(gap, probabilities, |_| ());
-            assert_eq!((verdict.kind, verdict.seen), (expected, expected), "{gap:?}");
-            assert_eq!(verdict.naming().named.is_empty(), !matches!(expected, Effect | Partial));
-        }
-    }
-
-    /// For random probabilities and sizes, the verdict follows the largest of the three
-    /// probabilities, and an effect is named only if the gap is relevant.
-    #[test]
-    fn no_verdict_contradicts_its_own_probability() {
-        let mut random = crate::numerics::random::RandomGenerator::new(11, 0);
-        let least_gap = Thresholds::frozen().least_gap;
-        for _ in 0..2000 {
-            let weights: [f64; 3] = std::array::from_fn(|_| random.unit() + 1e-9);
-            let sum: f64 = weights.iter().sum();
-            let p = weights.map(|w| w / sum);
-            let retuned = 10.0_f64.powf(4.0 * random.unit() - 2.0);
-            let gap = [retuned * (1.0 + random.unit()), retuned, retuned * random.unit()];
-            let verdict = judged(gap, p, |_| ());
-            let greatest = p.iter().copied().fold(0.0, f64::max);
-            match verdict.kind {
-                Effect | Partial => assert!(p[0] == greatest && retuned > least_gap),
-                Unknown => assert_eq!(p[2], greatest),
-                NoGap | Parameters => {
-                    assert!(p[1] == greatest || (p[0] == greatest && retuned <= least_gap))
+    /// Returns the answer of a kind, with its numbers.
+    pub(super) fn answer(&self, kind: VerdictKind, naming: Naming) -> Answer {
+        let Self { simulator, evidence, null_band, .. } = *self;
+        let (gap, first) = (evidence.gap, self.candidates.first());
+        match (kind, first) {
+            (VerdictKind::Record, first) => {
+                let first = first.filter(|_| !self.gross.iter().any(Gross::is_plain));
+                let corrected = first.map(|first| Closed::of(first, first.probability));
+                Answer::WrongRecord { errors: self.gross.to_vec(), corrected }
+            }
+            (VerdictKind::Effect | VerdictKind::Partial, Some(first)) => {
+                let mut effects = missing_effects(&naming, self.shares, self.candidates, simulator);
+                let is_part = kind == VerdictKind::Partial;
+                if is_part {
+                    effects.sort_by(|a, b| b.closes.total_cmp(&a.closes));
                 }
-                Record => panic!("nothing is wrong with the record"),
+                Answer::Missing {
+                    effects,
+                    closes: Closed::of(first, naming.probability(self.candidates)),
+                    rest: is_part.then(|| self.unexplained(first)),
+                    faint: naming.faint,
+                    ended: self.ended(),
+                }
+            }
+            (VerdictKind::Effect | VerdictKind::Partial | VerdictKind::Unknown, first) => {
+                self.unknown(first)
+            }
+            _ if gap.retuned > null_band => Answer::Faint {
+                left: multiple(gap.retuned),
+                noise: multiple(null_band),
+                stage: self.worst(|s| s.excess_retuned),
+                is_retuned: kind == VerdictKind::Parameters,
+                small: naming.faint,
+            },
+            (VerdictKind::NoGap, _) => Answer::Agrees { small: naming.faint },
+            (VerdictKind::Parameters, _) => Answer::Retuned {
+                shipped: multiple(gap.raw),
+                left: multiple(gap.retuned),
+                small: naming.faint,
+            },
+        }
+    }
+
+    fn unknown(&self, first: Option<&Candidate>) -> Answer {
+        let Self { simulator, evidence, shares, .. } = *self;
+        let best = evidence.best_effect.map(|e| simulator.effects()[e].name.clone());
+        // Shares of a set that closes nothing describe only how its effects compensate for each
+        // other.
+        let together = shares.iter().map(|s| s.closes).sum();
+        let parts = shares.iter().filter(|s| s.closes >= LEAST_PART && together > 0.0);
+        // The numbers of the first candidate, which the tables show.
+        let set = first.filter(|first| !first.fits_worse() && !first.parameters.is_empty());
+        let before = set.map_or(evidence.gap.retuned, |set| set.gap_before);
+        let left = set.map_or(multiple(evidence.gap.left), Candidate::leaves);
+        Answer::Unknown {
+            stage: self.worst(|s| s.excess_after),
+            left: multiple(before),
+            best: best.map(|best| (best, left)),
+            parts: parts.cloned().collect(),
+            together,
+        }
+    }
+
+    /// Returns the parameters at the ends of their tolerances with the best set, each with its
+    /// distance from the nominal value in tolerances.
+    fn ended(&self) -> Vec<(String, f64)> {
+        let all = self.simulator.parameters().iter().zip(&self.evidence.best.parameters);
+        let ended = all.filter(|(spec, value)| spec.is_at_end(**value));
+        ended.map(|(spec, value)| (spec.name.clone(), (value - spec.nominal) / spec.sd)).collect()
+    }
+
+    /// Returns the share of the gap on the test trials that the first candidate leaves, and the
+    /// slices of the trials in which its residual is largest.
+    fn unexplained(&self, first: &Candidate) -> Unexplained {
+        let stage = self.worst(|s| s.excess_after);
+        let mut loud =
+            localise::slices(self.simulator, self.evidence, |s| &s.residual_after, self.seed);
+        loud.retain(|s| s.stands_out && s.stage == stage);
+        loud.sort_by(|a, b| b.excess.total_cmp(&a.excess));
+        let mut sits: Vec<String> = Vec::new();
+        for slice in loud.iter().take(REPORTED_SLICES) {
+            let axis = format!("{}: ", slice.by);
+            match sits.iter_mut().find(|one| one.starts_with(&axis)) {
+                Some(one) => *one += &format!(", {}", slice.slice),
+                None => sits.push(axis + &slice.slice),
             }
         }
+        Unexplained { share: 1.0 - first.closed, stage, sits }
     }
 
-    /// A probable set that closes nothing on trials that were not fitted is not named.
-    #[test]
-    fn a_set_that_predicts_no_better_is_not_named() {
-        let useless = [Candidate { closed: -0.1, ..candidate(&["play"], 1.0) }];
-        let posterior = posterior(1.0, 0.0, 0.0, 3.0);
-        let case = Case {
-            gap: Excess { raw: 0.1, retuned: 3.5, left: 3.0 },
-            posterior: &posterior,
-            candidates: &useless,
-            shares: &[],
-            sanity: &SOUND,
-            is_record: false,
-            too_little: None,
-        };
-        let verdict = judge(&case, &Thresholds::frozen());
-        assert_eq!((verdict.kind, verdict.naming()), (Unknown, Naming::default()));
+    /// Returns the name of the stage with the largest excess.
+    fn worst(&self, excess: fn(&StageEvidence) -> f64) -> String {
+        let all = self.evidence.stages.iter().zip(self.simulator.stages());
+        let worst = all.max_by(|a, b| excess(a.0).total_cmp(&excess(b.0)));
+        worst.map_or(String::new(), |(_, spec)| spec.name.clone())
     }
+}
 
-    #[test]
-    fn what_is_certain_and_small_is_told_below() {
-        let small = judged([0.2, 0.04, 0.01], [0.99, 0.01, 0.0], |_| ());
-        assert_eq!(
-            (small.kind, small.naming().faint.as_slice()),
-            (Parameters, &["play".to_owned()][..])
-        );
-        assert!(small.naming().named.is_empty());
-        let chance = judged([0.2, 0.04, 0.01], [0.3, 0.7, 0.0], |_| ());
-        assert_eq!((chance.kind, chance.naming()), (Parameters, Naming::default()));
-    }
-
-    #[test]
-    fn parameters_at_their_ends_and_a_short_record_carry_no_name() {
-        let (gap, p) = ([20.0, 10.0, 0.1], [0.9, 0.0, 0.1]);
-        let record = judged(gap, p, |case| case.is_record = true);
-        assert_eq!((record.kind, record.overruled), (Record, None));
-        let ended = |rivals| {
-            let at_bounds = AtBounds { stage: 0, ended: vec![0, 1], left: 3.0, rivals };
-            let sanity = Sanity { at_bounds: Some(at_bounds), ..SOUND.clone() };
-            let [play, nothing, unknown] = p;
-            let candidates = [candidate(&["play"], play)];
-            let case = Case {
-                gap: Excess { raw: 20.0, retuned: 10.0, left: 0.1 },
-                posterior: &posterior(play, nothing, unknown, 0.1),
-                candidates: &candidates,
-                shares: &[],
-                sanity: &sanity,
-                is_record: false,
-                too_little: None,
-            };
-            judge(&case, &Thresholds::frozen()).kind
-        };
-        assert_eq!((ended(Some((0.1, 0.05))), ended(None)), (Unknown, Unknown));
-        // Free parameters leave more than the effects do, so the effects are kept.
-        assert_eq!(ended(Some((0.1, 4.0))), Effect);
-        let short = TooLittle::Short { fit_s: 3.75, test_s: 1.25, block_s: 0.5 };
-        let verdict = judged(gap, p, |case| case.too_little = Some(short));
-        assert_eq!(
-            (verdict.kind, verdict.seen, verdict.naming().named.len()),
-            (Unknown, Effect, 0)
-        );
-        assert_eq!(verdict.overruled, Some(Overruled::TooLittle(short)));
-        // An unknown cause may be the most probable only because the recording is short.
-        let unknown = judged(gap, [0.2, 0.0, 0.8], |case| case.too_little = Some(short));
-        assert_eq!((unknown.kind, unknown.seen), (Unknown, Unknown));
-        assert_eq!(unknown.overruled, Some(Overruled::TooLittle(short)));
-        // If there is no relevant gap, a short recording does not override the verdict.
-        let quiet = judged([0.01; 3], [0.0, 1.0, 0.0], |case| case.too_little = Some(short));
-        assert_eq!((quiet.kind, quiet.overruled), (NoGap, None));
-    }
+/// Returns the named effects with their alternatives, in the order of the naming.
+pub(super) fn missing_effects(
+    naming: &Naming,
+    shares: &[EffectShare],
+    candidates: &[Candidate],
+    simulator: &dyn Simulator,
+) -> Vec<MissingEffect> {
+    let one = |name: &String| {
+        let own = shares.iter().find(|s| s.effect == *name);
+        let ties = naming.ties.iter().filter(|(named, _)| named == name);
+        let alternatives: Vec<String> = ties.map(|(_, other)| other.clone()).collect();
+        MissingEffect {
+            name: name.clone(),
+            family: EffectFamily::of(name, &alternatives, candidates, simulator),
+            alternatives,
+            closes: own.map_or(0.0, |s| s.closes),
+            at_bound: own.is_some_and(|s| s.at_bound),
+        }
+    };
+    naming.named.iter().map(one).collect()
 }

@@ -73,17 +73,6 @@ impl Naming {
         let tied: f64 = candidates.iter().filter(is_tied).map(|c| c.probability).sum();
         (first.probability + tied).min(1.0)
     }
-
-    /// Returns every effect that is an alternative to a named one, once.
-    pub(crate) fn tied(&self) -> Vec<String> {
-        let mut tied: Vec<String> = Vec::new();
-        for (_, other) in &self.ties {
-            if !tied.contains(other) {
-                tied.push(other.clone());
-            }
-        }
-        tied
-    }
 }
 
 /// If the sets differ in exactly one effect, returns that effect of the first set and the effect

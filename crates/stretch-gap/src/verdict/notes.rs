@@ -1,5 +1,6 @@
-//! Notes about a verdict: gross errors, implausible noise, oscillating parameters, extrapolated
-//! drift, and how strong other effects would have to be for the diagnosis to name them.
+//! Notes about a diagnosis, each with a code: gross errors, implausible noise, oscillating
+//! parameters, extrapolated drift, and how strong other effects would have to be for the diagnosis
+//! to name them.
 
 use stretch_data::{after_number, in_digits};
 
@@ -14,15 +15,19 @@ use crate::{
         identifiability::{Identified, Knowledge},
         metric::Metric,
         prepared::PreparedProblem,
+        starts::Starts,
     },
     problem::{
         record_facts::nouns,
         runs::Runs,
         sample_roles::{Role, SampleRoles},
-        simulator::Simulator,
+        simulator::{ModelRuns, Simulator},
         spec::{EffectSpec, StageSpec, TrialSpec},
     },
-    verdict::{answer::Answer, note::Note},
+    verdict::{
+        answer::Answer,
+        note::{Note, NoteCode},
+    },
 };
 
 /// Returns notes that complete the answer: that there is no test trial, that most of a channel is
@@ -34,14 +39,14 @@ pub(crate) fn answer_notes(
     evidence: &Evidence,
 ) -> Vec<Note> {
     let held = "there is no test trial: the last quarter of every trial is held back and tested on";
-    let held = evidence.roles.borrowed_test.then(|| Note::from(held.to_owned()));
+    let held = evidence.roles.borrowed_test.then(|| Note::new(NoteCode::NoTestTrial, held));
     let nouns = nouns(simulator.record().gauge_alone);
-    let seen = || Note::default().text("before that was seen: ");
+    let seen = || Note::new(NoteCode::Overridden, "before that was seen: ");
     let otherwise = match answer {
         Answer::AtBounds { otherwise, .. } => Some(seen().answer((**otherwise).clone(), nouns)),
         _ => None,
     };
-    let gross = gross_misfit(sanity, simulator, nouns).map(Note::from);
+    let gross = gross_misfit(sanity, simulator, nouns);
     held.into_iter().chain(gross).chain(otherwise).collect()
 }
 
@@ -51,15 +56,16 @@ fn gross_misfit(
     sanity: &Sanity,
     simulator: &dyn Simulator,
     [model, rig]: [&str; 2],
-) -> Option<String> {
+) -> Option<Note> {
     let left = sanity.left.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
     let (stage, share) = left.filter(|(_, share)| **share > sanity.allowed)?;
     let spec = &simulator.stages()[stage];
-    Some(format!(
+    let text = format!(
         "{:.0} % of what {} does is not in the {model}: is it the right {rig}, and is every column what its name says?",
         100.0 * share.min(1.0),
         spec.channel
-    ))
+    );
+    Some(Note::new(NoteCode::NotSimulated, text))
 }
 
 /// Kinds of effect at the input or the output of a machine that dry friction inside it looks like.
@@ -90,7 +96,7 @@ pub(crate) fn friction_note(simulator: &dyn Simulator, named: &[String]) -> Opti
     let name = named.iter().find(looks_alike)?;
     let text = ": dry friction inside the machine looks alike, and the simulator declares none; to compare the two, declare \
         the friction as an effect of the simulator";
-    Some(Note::default().effect(name).text(text))
+    Some(Note::new(NoteCode::LooksLikeFriction, "").effect(name).text(text))
 }
 
 /// Returns a note that lists the parameters that change no simulated output.
@@ -98,25 +104,26 @@ pub(crate) fn dead_parameters_note(identifiability: &[Identified]) -> Option<Not
     let dead = identifiability.iter().filter(|one| one.knowledge == Knowledge::Dead);
     let names: Vec<&str> = dead.map(|one| one.name.as_str()).collect();
     (!names.is_empty()).then(|| {
-        Note::from(format!(
+        let text = format!(
             "no change of {} changes the simulation: check that the simulator uses what it receives, and that the recordings excite it",
             names.join(" or ")
-        ))
+        );
+        Note::new(NoteCode::UnusedParameters, text)
     })
 }
 
 /// Returns a note that lists the effects that were screened and not fitted.
 pub(crate) fn not_fitted_note(names: &[String]) -> Option<Note> {
-    let listed = Note::default()
-        .text("not fitted, because a first test of each effect favoured others: ")
-        .effects(&names[..names.len().min(LISTED)], ", ");
+    let because = "not fitted, because a first test of each effect favoured others: ";
+    let listed =
+        Note::new(NoteCode::NotFitted, because).effects(&names[..names.len().min(LISTED)], ", ");
     let more = names.len().saturating_sub(LISTED);
     let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
     (!names.is_empty()).then(|| listed.text(rest))
 }
 
 /// Returns a note for each output with samples that [are isolated](crate::fit::isolated_outliers).
-pub(crate) fn gross_error_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
+pub(crate) fn gross_error_notes(problem: &PreparedProblem<'_>) -> Vec<Note> {
     let stages = problem.compare.metrics.iter().zip(problem.simulator().stages());
     let note = |(metric, stage): (&Metric, &StageSpec)| {
         let isolated = metric.noise.isolated;
@@ -124,11 +131,12 @@ pub(crate) fn gross_error_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
         let (are, do_not) =
             if isolated == 1 { ("is a gross error", "does") } else { ("are gross errors", "do") };
         (isolated > 0).then(|| {
-            format!(
+            let text = format!(
                 "{isolated} of {} values of {} {are} and {do_not} not count",
                 isolated + counted,
                 stage.channel
-            )
+            );
+            Note::new(NoteCode::GrossErrors, text)
         })
     };
     stages.filter_map(note).collect()
@@ -140,9 +148,12 @@ pub(crate) fn lost_note(runs: &Runs<'_>) -> Option<Note> {
     let (models, first) = runs.lost_models()?;
     let count: usize = models.values().sum();
     let (s, it) = if count == 1 { ("", "it") } else { ("s", "them") };
-    let begin = Note::default().text(format!(
-        "{count} model{s} could not be simulated, and the diagnosis went on without {it}: "
-    ));
+    let begin = Note::new(
+        NoteCode::FailedRuns,
+        format!(
+            "{count} model{s} could not be simulated, and the diagnosis went on without {it}: "
+        ),
+    );
     let one = |note: Note, (i, (set, own)): (usize, (&Vec<String>, &usize))| {
         let note = note.text(if i == 0 { "" } else { ", " });
         match set.is_empty() {
@@ -155,33 +166,32 @@ pub(crate) fn lost_note(runs: &Runs<'_>) -> Option<Note> {
 
 /// Returns a note for each output whose noise is [implausible](crate::evidence::sanity), because
 /// such noise hides gaps.
-pub(crate) fn implausible_noise_notes(
-    problem: &PreparedProblem<'_>,
-    sanity: &Sanity,
-) -> Vec<String> {
+pub(crate) fn implausible_noise_notes(problem: &PreparedProblem<'_>, sanity: &Sanity) -> Vec<Note> {
     let note = |(stage, share): &(usize, f64)| {
         let spec = &problem.simulator().stages()[*stage];
         let noise = &problem.compare.metrics[*stage].noise;
-        format!(
+        let text = format!(
             "the noise of {} is implausible, {:.2e} {} ({}): even without an effect the simulation \
              leaves only {share:.2} of it, so the true noise is smaller, and the assumed noise hides every gap of its size; state the \
              true noise of the stage",
             spec.channel, noise.rms, spec.unit, noise.source
-        )
+        );
+        Note::new(NoteCode::ImplausibleNoise, text)
     };
     sanity.implausible.iter().map(note).collect()
 }
 
 /// Returns a note for each output to which the recorder seems to add slow noise.
-pub(crate) fn recorder_notes(problem: &PreparedProblem<'_>) -> Vec<String> {
+pub(crate) fn recorder_notes(problem: &PreparedProblem<'_>) -> Vec<Note> {
     let stages = problem.compare.metrics.iter().zip(problem.simulator().stages());
     let note = |(metric, spec): (&Metric, &StageSpec)| {
         let (times, time_s) = metric.recorder_drift()?;
-        Some(format!(
+        let text = format!(
             "{} has slow noise with a correlation time of {time_s} s and {times:.2} times the standard deviation of its other noise: it is taken \
              for noise of the recorder, so a gap as small and as slow would not be found",
             spec.channel
-        ))
+        );
+        Some(Note::new(NoteCode::SlowNoise, text))
     };
     stages.filter_map(note).collect()
 }
@@ -191,15 +201,16 @@ const WORSE: f64 = 1.2;
 
 /// Returns a note for each output that the re-tuned parameters predict worse on test trials than
 /// the parameters as shipped.
-pub(crate) fn retuning_notes(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<String> {
+pub(crate) fn retuning_notes(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<Note> {
     let note = |(spec, traces): (&StageSpec, &StageEvidence)| {
         let (shipped, retuned) = (multiple(traces.excess_raw), multiple(traces.excess_retuned));
         (retuned > WORSE * shipped.max(1.0)).then(|| {
-            format!(
+            let text = format!(
                 "the re-tuned parameters predict {} on trials that were not fitted worse than those as shipped ({retuned:.2} against {shipped:.2} \
                  times the noise): they make up for something else",
                 spec.channel
-            )
+            );
+            Note::new(NoteCode::RetuningHarms, text)
         })
     };
     simulator.stages().iter().zip(&evidence.stages).filter_map(note).collect()
@@ -212,7 +223,7 @@ const AT_BEGINNING: f64 = 0.5;
 
 /// Returns a note for each output whose gap is at the beginnings of the trials, because the
 /// simulator may start from another state than the rig.
-pub(crate) fn start_notes(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<String> {
+pub(crate) fn start_notes(simulator: &dyn Simulator, evidence: &Evidence) -> Vec<Note> {
     let trials = TrialSpec::ranges(simulator.trials());
     let [model, rig] = nouns(simulator.record().gauge_alone);
     let note = |(spec, traces): (&StageSpec, &StageEvidence)| {
@@ -226,15 +237,51 @@ pub(crate) fn start_notes(simulator: &dyn Simulator, evidence: &Evidence) -> Vec
         });
         let share = early / whole;
         (whole > 0.0 && share > AT_BEGINNING).then(|| {
-            format!(
+            let text = format!(
                 "{:.0} % of the gap in {} is in the first tenth of the recordings: check that the {model} starts from the state in which \
                  the {rig} was at the first sample",
                 100.0 * share.min(1.0),
                 spec.channel
-            )
+            );
+            Note::new(NoteCode::InitialState, text)
         })
     };
     simulator.stages().iter().zip(&evidence.stages).filter_map(note).collect()
+}
+
+/// Returns a note that the starts of re-tuning disagree; `None` if they agree.
+pub(crate) fn starts_note(Starts { tried, agreed }: Starts) -> Option<Note> {
+    (agreed < tried).then(|| {
+        let text = format!(
+            "re-tuning ends at different values: {agreed} of {tried} starts within the tolerances reached the best fit, with which the \
+             diagnosis continues; narrow the tolerances of the parameters if you can"
+        );
+        Note::new(NoteCode::StartsDisagree, text)
+    })
+}
+
+/// Returns a note if the search was cut short because the budget of runs was spent.
+pub(crate) fn budget_note(runs: ModelRuns) -> Option<Note> {
+    let budget = runs.budget.filter(|_| runs.is_spent)?;
+    let text = format!(
+        "the budget of {budget} model runs was spent before the search was over ({} were made): the answer is based on what was fitted \
+         until then; allow more runs to continue the search",
+        runs.count
+    );
+    Some(Note::new(NoteCode::BudgetSpent, text))
+}
+
+/// Returns a note that lists the effects that were not examined.
+pub(crate) fn not_examined_note(names: &[String]) -> Option<Note> {
+    let because = "not looked at, because their runs failed: ";
+    (!names.is_empty()).then(|| Note::new(NoteCode::NotExamined, because).effects(names, ", "))
+}
+
+/// Returns a note that the model without effects keeps earlier parameters.
+pub(crate) fn kept_parameters_note(problem: &PreparedProblem<'_>) -> Option<Note> {
+    let held = "the re-tuned parameters could not be simulated over all trials, so the model without effects keeps the last parameters that \
+        could";
+    problem.is_held.then(|| Note::new(NoteCode::KeptParameters, held))
 }
 
 /// Share of the fitted time span by which test trials must lie outside this span for a note.
@@ -258,7 +305,7 @@ pub(crate) fn extrapolation_notes(
     let least = BEYOND * (fitted[1] - fitted[0]);
     let is_beyond = fitted[0] - tested[0] > least || tested[1] - fitted[1] > least;
     let note = |name: &String| {
-        Note::default().effect(name).text(format!(
+        Note::new(NoteCode::ExtrapolatedDrift, "").effect(name).text(format!(
             " is a law of session time: it was fitted from {:.0} to {:.0} s and extrapolated to the test trials, from {:.0} to {:.0} s; \
              if the drift follows another law, the extrapolation is far off",
             fitted[0], fitted[1], tested[0], tested[1]
@@ -306,8 +353,8 @@ pub(crate) fn detection_limit_note(
         let note = note.text(if i == 0 { "" } else { ", " }).effect(&limit.effect);
         note.text(format!(" {}{unit}", in_digits(limit.strength.unwrap_or(0.0), 2)))
     };
-    let begin = Note::default()
-        .text("An effect would have been named if it were stronger than its limit: ");
+    let begin = "An effect would have been named if it were stronger than its limit: ";
+    let begin = Note::new(NoteCode::DetectionLimits, begin);
     let listed = known.iter().take(LISTED).enumerate().fold(begin, one);
     let rest = if known.len() > LISTED { ", and more in the table" } else { "" };
     let how = format!("{rest} (with probability 0.9).");

@@ -1,27 +1,31 @@
-//! The answer of a diagnosis in words.
+//! The answer of a diagnosis in sentences. Text, page, files and Python show these.
+
+use stretch_data::{after_number, in_digits, listed};
 
 use crate::{
+    evidence::candidates::{ParameterShift, multiple},
     problem::record_facts::nouns,
     record::gross::sentence,
     verdict::{
         answer::{Answer, Closed, MissingEffect},
-        diagnosis::Diagnosis,
-        family::EffectFamily,
+        diagnosis::{Diagnosis, NextExperiment},
+        phrases::{
+            NOT_ALL, also_seen, alternatives, at_ends, capitalised, closed, decapitalised,
+            first_of, is_numbered, least_percent, left_with, numbered, of_stage, percent,
+            too_small, two_digits, with_share,
+        },
     },
 };
-
-/// Size of the residual, in multiples of the noise, above which the text states at most 99 % of the
-/// gap as closed and at most 0.99 as a probability.
-const NOT_ALL: f64 = 1.5;
 
 /// Share of the gap from which effects are said to explain the gap mostly, instead of in part.
 const MOST: f64 = 0.5;
 
-/// Smallest share that is given as a number, and not as "less than 1 %".
-const LEAST_SHARE_IN_WORDS: f64 = 0.01;
+/// Ratio of the errors of a calibration, with the effects to without them, below which the
+/// improvement is reported.
+const BETTER: f64 = 0.9;
 
-/// Largest number of effects that are listed as not examined.
-const LISTED: usize = 6;
+/// The condition of every probability.
+const GIVEN: &str = "given this catalogue";
 
 impl Diagnosis {
     /// Describes the answer in plain sentences, without the next step; `probability` formats a
@@ -35,10 +39,9 @@ impl Diagnosis {
     /// }
     /// ```
     pub fn in_sentences(&self, probability: &dyn Fn(f64) -> String) -> String {
-        let Some(answer) = &self.answer else { return self.sentence.clone() };
         let proposed = self.proposed.as_ref().map_or(String::new(), |p| format!(" {}", p.sentence));
         let nouns = nouns(self.gauge_alone);
-        let finding = match answer {
+        let finding = match &self.answer {
             Answer::Unknown { stage, left, .. } if self.none_examined => format!(
                 "There is a gap in {}: the re-tuned {} leaves {left:.2} times the noise.",
                 of_stage(stage, nouns[0]),
@@ -49,8 +52,7 @@ impl Diagnosis {
         self.preface() + &finding + &proposed
     }
 
-    /// Returns what to do next, in a sentence; empty for a diagnosis without an
-    /// [answer](Self::answer).
+    /// Returns what to do next, in a sentence.
     ///
     /// ```
     /// use stretch_gap::Diagnosis;
@@ -61,35 +63,34 @@ impl Diagnosis {
     pub fn next_step(&self) -> String {
         let [simulator, _] = nouns(self.gauge_alone);
         let step = match &self.answer {
-            None => "",
-            Some(Answer::Agrees { .. }) => "Nothing has to change.",
-            Some(Answer::Retuned { .. }) => "Set the re-tuned parameters, then diagnose again.",
-            Some(Answer::Faint { .. }) => {
+            Answer::Agrees { .. } => "Nothing has to change.",
+            Answer::Retuned { .. } => "Set the re-tuned parameters, then diagnose again.",
+            Answer::Faint { .. } => {
                 "Check whether the noise is larger than stated. If it is not, something small is missing."
             }
-            Some(answer) if answer.effects().iter().any(MissingEffect::is_tied) => {
+            answer if answer.effects().iter().any(MissingEffect::is_tied) => {
                 if self.next_experiment.as_ref().is_some_and(|next| next.separates.is_empty()) {
                     return "Measure another quantity that tells them apart before you build on one.".into();
                 }
                 "Run an experiment that tells them apart before you build on one."
             }
-            Some(Answer::Missing { effects, .. } | Answer::Partly { effects, .. }) => {
+            Answer::Missing { effects, .. } => {
                 let them = if effects.len() == 1 { "it" } else { "them" };
                 &format!("Add {them} to the {simulator}, then diagnose again.")
             }
-            Some(Answer::WrongRecord { .. }) => "Correct this error, then diagnose again.",
-            Some(Answer::Unknown { .. }) if self.none_examined => {
+            Answer::WrongRecord { .. } => "Correct this error, then diagnose again.",
+            Answer::Unknown { .. } if self.none_examined => {
                 "Diagnose again with a larger budget of runs."
             }
-            Some(Answer::Unknown { .. })
+            Answer::Unknown { .. }
                 if self.proposed.as_ref().is_some_and(|p| !p.equation.is_empty()) =>
             {
                 &format!("Add the proposed term to the {simulator}, then diagnose again.")
             }
-            Some(Answer::Unknown { .. } | Answer::AtBounds { .. }) => &format!(
+            Answer::Unknown { .. } | Answer::AtBounds { .. } => &format!(
                 "Look where most is left, and add to the {simulator} what happens there as an effect of its own."
             ),
-            Some(Answer::TooLittle { .. }) => "Record more, then diagnose again.",
+            Answer::TooLittle { .. } => "Record more, then diagnose again.",
         };
         step.to_owned()
     }
@@ -99,12 +100,9 @@ impl Diagnosis {
     pub(crate) fn headline(&self) -> String {
         let finding = self.in_sentences(&two_digits);
         match &self.answer {
-            Some(
-                Answer::Retuned { .. }
-                | Answer::Missing { .. }
-                | Answer::Partly { .. }
-                | Answer::Unknown { .. },
-            ) => format!("{finding} Next: {}", decapitalised(&self.next_step())),
+            Answer::Retuned { .. } | Answer::Missing { .. } | Answer::Unknown { .. } => {
+                format!("{finding} Next: {}", decapitalised(&self.next_step()))
+            }
             _ => finding,
         }
     }
@@ -121,53 +119,269 @@ impl Diagnosis {
                 "The budget of runs was spent before the search was over. ".to_owned()
             }
             Some(rest) => {
-                format!("The budget of runs was spent; not looked at: {}. ", listed(rest))
+                format!("The budget of runs was spent; not looked at: {}. ", first_of(rest))
             }
         };
         if !self.not_examined.is_empty() {
             out += &format!(
                 "Not looked at, because their runs failed: {}. ",
-                listed(&self.not_examined)
+                first_of(&self.not_examined)
             );
         }
         out
     }
-}
 
-/// Formats a probability for sentences. One that is not certain is never rounded to 1.
-pub(crate) fn two_digits(probability: f64) -> String {
-    match (0.995..1.0).contains(&probability) {
-        true => "over 0.99".to_owned(),
-        false => format!("{probability:.2}"),
+    /// Returns the headline of a page. If effects are named, it states only that they are missing,
+    /// because [`facts`](Self::facts) follow.
+    pub fn title(&self) -> String {
+        let [simulator, _] = nouns(self.gauge_alone);
+        match &self.answer {
+            Answer::Missing { effects, rest: None, .. } => {
+                let lacking = Answer::effects_in_words(effects);
+                format!("{}The {simulator} lacks {lacking}.", self.preface())
+            }
+            // a probability holds only among the candidates, so the text adds this condition
+            _ => self.in_sentences(&|p| format!("{} {GIVEN}", percent(p))),
+        }
+    }
+
+    /// Returns four short answers with their questions: the change, its certainty, its gain, and
+    /// the next step.
+    pub fn facts(&self) -> [(&'static str, String); 4] {
+        let [change, certainty, gain] = match &self.answer {
+            Answer::Agrees { .. } => ["Nothing.".to_owned(), within_noise(), self.usable()],
+            Answer::Retuned { .. } => {
+                [self.moved(), within_noise(), "The whole gap closes by re-tuning.".to_owned()]
+            }
+            Answer::Faint { is_retuned, left, .. } => {
+                let too_little =
+                    "More is left than the stated noise explains, but too little to name a cause.";
+                let [change, gain] = match is_retuned {
+                    false => ["Nothing.".to_owned(), self.usable()],
+                    true => {
+                        let left =
+                            format!("With re-tuned parameters {left:.3} times the noise is left.");
+                        [self.moved(), left]
+                    }
+                };
+                [change, too_little.to_owned(), gain]
+            }
+            Answer::Missing { effects, .. } => [
+                format!("Add {}.", Answer::effects_in_words(effects)),
+                self.certainty(),
+                capitalised(&self.gain()) + &self.calibration_gain(),
+            ],
+            Answer::WrongRecord { errors, corrected } => {
+                let hint: String = errors.iter().map(|g| g.hint.as_str()).take(1).collect();
+                let change = format!(
+                    "Nothing yet. The recording and the parameters have to be right first: {hint}."
+                );
+                let [certainty, gain] = match corrected {
+                    None => [
+                        "The columns alone show this, whatever was simulated.".to_owned(),
+                        "A usable recording.".to_owned(),
+                    ],
+                    Some(Closed { probability, .. }) => [
+                        format!(
+                            "Probability {} compared with every set of effects, {GIVEN}.",
+                            percent(*probability)
+                        ),
+                        capitalised(&self.gain()) + " After that, effects can be seen.",
+                    ],
+                };
+                [change, certainty, gain]
+            }
+            Answer::Unknown { .. } | Answer::AtBounds { .. } | Answer::TooLittle { .. } => {
+                let stages = self.location.stages.iter();
+                let place = stages
+                    .max_by(|a, b| a.share.total_cmp(&b.share))
+                    .map_or_else(String::new, |s| {
+                        format!("{} ({} of the gap)", s.stage, percent(s.share))
+                    });
+                [
+                    format!("No effect of the catalogue explains the gap. Look at {place}."),
+                    "There is certainly a gap; the effects of the catalogue explain at most a part of it.".to_owned(),
+                    format!("The best that the catalogue offers: {}", self.gain()),
+                ]
+            }
+        };
+        [
+            ("What to change", change),
+            ("How sure", certainty),
+            ("What it gains", gain),
+            ("What to do next", self.to_do()),
+        ]
+    }
+
+    /// Describes how certain the missing effects are.
+    fn certainty(&self) -> String {
+        let rivals = self.rivals();
+        let rest = if !self.answer.tied().is_empty() {
+            "that is the probability of all alternatives together".to_owned()
+        } else if !rivals.is_empty() {
+            format!("these data cannot rule out {}", listed(&rivals))
+        } else if self.answer.leaves_more_than_noise() {
+            "nothing else that was tried explains as much, and more than noise is left".to_owned()
+        } else {
+            "nothing else explains these data as well".to_owned()
+        };
+        let p = self.answer.probability().unwrap_or(0.0);
+        format!("Probability {} {GIVEN}: {rest}.", percent(p))
+    }
+
+    /// Describes what the first candidate closes.
+    fn gain(&self) -> String {
+        let Some(best) = self.candidates.first() else { return String::new() };
+        let fitted = match best.fits_worse() {
+            true => format!(", {:.2} times on those that were", best.leaves()),
+            false => String::new(),
+        };
+        format!(
+            "{} of the gap closes on trials that were not fitted: {:.2} times the noise is left{fitted}.",
+            closed(&Closed::of(best, best.probability)),
+            multiple(best.gap_after)
+        )
+    }
+
+    /// Returns a sentence on the improvement of a calibration, if there is one.
+    fn calibration_gain(&self) -> String {
+        let errors = self.transfer.as_ref().map(|t| t.poly13);
+        match errors.filter(|e| e.sim_with_effect < BETTER * e.sim) {
+            Some(e) => format!(
+                " A non-linear calibration trained on simulated trials then has an error of {} instead of {} of full scale.",
+                percent(0.01 * e.sim_with_effect),
+                percent(0.01 * e.sim)
+            ),
+            None => String::new(),
+        }
+    }
+
+    fn usable(&self) -> String {
+        format!("The {} can be used as it is.", nouns(self.gauge_alone)[0])
+    }
+
+    /// Lists the parameters that re-tuning moved by more than a tolerance.
+    fn moved(&self) -> String {
+        let far = self.parameters.iter().filter(|p| p.is_evidence && p.sigmas.abs() > 1.0);
+        let one = |p: &ParameterShift| {
+            format!("{} to {}{}", p.name, in_digits(p.fitted, 3), after_number(&p.unit))
+        };
+        let moved: Vec<String> = far.map(one).collect();
+        match moved.is_empty() {
+            true => "Take the re-tuned parameters below.".to_owned(),
+            false => format!("Set {}.", listed(&moved)),
+        }
+    }
+
+    /// Returns the next step and the next experiment, in sentences.
+    fn to_do(&self) -> String {
+        let next = self.next_experiment.as_ref().filter(|next| !next.separates.is_empty());
+        let Some(next) = next else { return self.next_step() };
+        let experiment = format!(
+            "Measure \u{201c}{}\u{201d} ({}): it would distinguish {}.",
+            next.title(),
+            next.duration(),
+            listed(&next.separates)
+        );
+        match !self.answer.effects().is_empty() && self.answer.tied().is_empty() {
+            true => format!("{} {experiment}", self.next_step()),
+            false => experiment,
+        }
+    }
+
+    /// Returns a sentence on the effects that the data cannot rule out; `None` if there are none.
+    pub fn rivals_in_words(&self) -> Option<String> {
+        match (self.named().as_slice(), self.rivals().as_slice()) {
+            (_, []) | ([], [_]) => None,
+            ([], rivals) => Some(format!(
+                "These data cannot distinguish, with 95 % probability: {}.",
+                listed(rivals)
+            )),
+            (named, rivals) => Some(format!(
+                "These data cannot tell {} from {} with 95 % probability, {GIVEN}.",
+                listed(named),
+                listed(rivals)
+            )),
+        }
+    }
+
+    /// Returns the proposed term in words; `None` if there is none.
+    pub fn proposed_in_words(&self) -> Option<String> {
+        let proposed = self.proposed.as_ref().filter(|p| !p.equation.is_empty())?;
+        Some(format!("Proposed effect, on the {}: {}.", proposed.acts, proposed.equation))
+    }
+
+    /// Returns a sentence on what a file with the findings contains.
+    pub fn fix_in_words(&self) -> String {
+        match &self.answer {
+            Answer::Agrees { .. } | Answer::Faint { is_retuned: false, .. } => {
+                "Nothing is missing: parameters are re-tuned within the noise, and no effect is added.".to_owned()
+            }
+            Answer::Retuned { .. } | Answer::Faint { .. } => {
+                "Parameters are re-tuned; no effect is added.".to_owned()
+            }
+            Answer::Missing { rest: Some(rest), .. } => {
+                format!("{:.0} % of the gap remains: this file does not close it.", 100.0 * rest.share)
+            }
+            _ => "Parameters are re-tuned with the effects in place.".to_owned(),
+        }
     }
 }
 
-/// Returns a sentence with a small first letter, to follow a colon.
-fn decapitalised(sentence: &str) -> String {
-    let (first, rest) = sentence.split_at(1);
-    first.to_lowercase() + rest
-}
+impl NextExperiment {
+    /// Returns the name without underscores.
+    fn title(&self) -> String {
+        self.name.replace('_', " ")
+    }
 
-/// Lists the first names, and the number of further ones.
-fn listed(names: &[String]) -> String {
-    let first = names[..names.len().min(LISTED)].join(", ");
-    match names.len().saturating_sub(LISTED) {
-        0 => first,
-        more => format!("{first} and {more} more"),
+    fn duration(&self) -> String {
+        match 60.0 * self.minutes {
+            seconds if seconds < 120.0 => format!("{} s", in_digits(seconds, 2)),
+            _ => format!("{} min", in_digits(self.minutes, 2)),
+        }
+    }
+
+    /// Describes the experiment in sentences.
+    ///
+    /// ```
+    /// use stretch_gap::NextExperiment;
+    /// let next = NextExperiment {
+    ///     name: "slow_fast_loops".into(),
+    ///     separates: vec!["hysteresis".into(), "slip".into()],
+    ///     d: 5.26,
+    ///     minutes: 1.5,
+    ///     why: "Slip does not depend on the rate.".into(),
+    /// };
+    /// assert_eq!(
+    ///     next.in_words(),
+    ///     "slow fast loops (90 s) would distinguish hysteresis and slip: whatever their parameters, their \
+    ///      predictions differ by 5.3 times the noise. Slip does not depend on the rate."
+    /// );
+    /// ```
+    pub fn in_words(&self) -> String {
+        if self.separates.is_empty() {
+            return self.why.clone();
+        }
+        format!(
+            "{} ({}) would distinguish {}: whatever their parameters, their predictions differ by {} times the noise. {}",
+            self.title(),
+            self.duration(),
+            listed(&self.separates),
+            in_digits(self.d, 2),
+            self.why
+        )
     }
 }
 
-/// Returns the name of a stage in a sentence. `simulator` is the default name of an only stage.
-fn of_stage(stage: &str, simulator: &str) -> String {
-    if stage == simulator { format!("the {stage}") } else { stage.to_owned() }
+fn within_noise() -> String {
+    "What is left is within the noise on trials that were not fitted.".to_owned()
 }
 
 impl Answer {
     /// Whether effects were found, but clearly more than noise is left after they are added.
     pub fn leaves_more_than_noise(&self) -> bool {
         match self {
-            Self::Missing { closes, .. } => closes.left > NOT_ALL,
-            Self::Partly { .. } => true,
+            Self::Missing { closes, rest, .. } => rest.is_some() || closes.left > NOT_ALL,
             _ => false,
         }
     }
@@ -191,16 +405,15 @@ impl Answer {
     ) -> String {
         match self {
             Self::Agrees { small } => {
-                let (first, rest) = simulator.split_at(1);
-                let begin = first.to_uppercase() + rest;
-                format!("{begin} and {rig} agree within the noise.") + &too_small(small)
+                format!("{} and {rig} agree within the noise.", capitalised(simulator))
+                    + &too_small(small)
             }
             Self::Retuned { shipped, left, small } => {
                 format!(
                     "No effect is missing: with its parameters re-tuned within their tolerances the {simulator} agrees with the {rig} (what is left is {shipped:.1} times the noise as shipped, {left:.2} re-tuned)."
                 ) + &too_small(small)
             }
-            Self::Faint { left, noise, stage, small } => {
+            Self::Faint { left, noise, stage, small, .. } => {
                 let found = match small.is_empty() {
                     true => "Too faint to name: ".to_owned(),
                     false => format!("Found, and too small to matter: {}; ", small.join(", ")),
@@ -211,7 +424,7 @@ impl Answer {
                     of_stage(stage, simulator)
                 )
             }
-            Self::Missing { effects, closes, faint, ended } => {
+            Self::Missing { effects, closes, rest: None, faint, ended } => {
                 let they = match (is_numbered(effects), effects.len()) {
                     (true, _) => ". Together they close",
                     (false, 1) => ": it closes",
@@ -225,37 +438,21 @@ impl Answer {
                 ) + &at_ends(ended)
                     + &also_seen(faint)
             }
-            Self::Partly {
-                effects,
-                closes,
-                left,
-                fits_worse,
-                probability: p,
-                rest,
-                faint,
-                ended,
-            } => {
-                let much = if *closes >= MOST { "Most" } else { "A part" };
-                let probable =
-                    p.map_or(String::new(), |p| format!(" (probability {})", probability(p)));
-                let where_left = if *fits_worse { " on trials that were fitted" } else { "" };
-                let rest = rest.as_ref().map_or(String::new(), |rest| {
-                    let share = match rest.share < LEAST_SHARE_IN_WORDS {
-                        true => "less than 1 %".to_owned(),
-                        false => format!("{:.0} %", 100.0 * rest.share.min(1.0)),
-                    };
-                    let sits = match rest.sits.is_empty() {
-                        true => String::new(),
-                        false => format!(", most of it at {}", rest.sits.join("; ")),
-                    };
-                    format!(
-                        " Not explained: {share} in {}{sits}; {left:.2} times the noise is left{where_left}.",
-                        of_stage(&rest.stage, simulator)
-                    )
-                });
+            Self::Missing { effects, closes, rest: Some(rest), faint, ended } => {
+                let much = if closes.share >= MOST { "Most" } else { "A part" };
+                let probable = probability(closes.probability);
+                let left = closes.left;
+                let where_left = if closes.fits_worse { " on trials that were fitted" } else { "" };
+                let share = least_percent(rest.share.min(1.0));
+                let sits = match rest.sits.is_empty() {
+                    true => String::new(),
+                    false => format!(", most of it at {}", rest.sits.join("; ")),
+                };
+                let rest = of_stage(&rest.stage, simulator);
                 let names = numbered(effects, with_share, ", ");
                 format!(
-                    "{much} of the gap on trials that were not fitted is explained{probable} by {names}.{rest}"
+                    "{much} of the gap on trials that were not fitted is explained (probability {probable}) by {names}. Not explained: \
+                     {share} in {rest}{sits}; {left:.2} times the noise is left{where_left}."
                 ) + &at_ends(ended)
                     + &also_seen(faint)
             }
@@ -306,118 +503,5 @@ impl Answer {
             ),
             Self::TooLittle { why } => why.words(),
         }
-    }
-}
-
-/// Describes the share of the gap that a hypothesis closes, with its interval; at most 99 % if the
-/// residual exceeds [`NOT_ALL`].
-fn closed(closes: &Closed) -> String {
-    let most = if closes.left > NOT_ALL { 99.0 } else { 100.0 };
-    let percent = |share: f64| (100.0 * share).round().clamp(0.0, most);
-    let [low, high] = closes.interval.map(percent);
-    let share = match (0.995..1.0).contains(&closes.share) {
-        true => "over 99 %".to_owned(),
-        false => format!("{:.0} %", percent(closes.share)),
-    };
-    if low == high { share } else { format!("{share} ({low:.0} to {high:.0} %)") }
-}
-
-/// Describes the residual that a hypothesis leaves, and its probability, which is at most 0.99 if
-/// the residual exceeds [`NOT_ALL`]. If much more is left on the fitted trials than on the others,
-/// the text says that the number refers to the fitted trials; tables give the value on the other
-/// trials.
-fn left_with(closes: &Closed, probability: &dyn Fn(f64) -> String) -> String {
-    let most = if closes.left > NOT_ALL { 0.99 } else { 1.0 };
-    format!(
-        "{:.2} times the noise is left{}; probability {}",
-        closes.left,
-        if closes.fits_worse { " on those that were" } else { "" },
-        probability(closes.probability.min(most))
-    )
-}
-
-impl MissingEffect {
-    fn is_tied(&self) -> bool {
-        !self.alternatives.is_empty()
-    }
-}
-
-/// Whether several effects are numbered, because one of them has alternatives.
-fn is_numbered(effects: &[MissingEffect]) -> bool {
-    effects.len() > 1 && effects.iter().any(MissingEffect::is_tied)
-}
-
-/// Lists effects in words, numbered or with a separator.
-fn numbered(
-    effects: &[MissingEffect],
-    words: impl Fn(&MissingEffect) -> String,
-    separator: &str,
-) -> String {
-    if !is_numbered(effects) {
-        return effects.iter().map(words).collect::<Vec<_>>().join(separator);
-    }
-    let all: Vec<String> =
-        (1..).zip(effects).map(|(i, effect)| format!("({i}) {}", words(effect))).collect();
-    let count = ["two", "three", "four"].get(effects.len() - 2).map_or("several", |word| *word);
-    format!("{count} effects: {}", all.join("; "))
-}
-
-/// Lists an effect and its alternatives. Alternatives that do the same are described together.
-fn alternatives(effect: &MissingEffect) -> String {
-    let family = effect.family.as_ref();
-    let is_other = |name: &&String| family.is_none_or(|family| !family.names.contains(name));
-    let own = family.map_or_else(|| effect.name.clone(), EffectFamily::words);
-    let others = effect.alternatives.iter().filter(is_other).cloned();
-    let all = std::iter::once(own).chain(others).collect::<Vec<_>>().join(" or ");
-    match (effect.is_tied(), family) {
-        (true, None) => format!("{all} (these data cannot tell which)"),
-        _ => all,
-    }
-}
-
-/// Lists an effect and its alternatives, with the share of the gap that the effect closes.
-fn with_share(effect: &MissingEffect) -> String {
-    let share = match effect.closes {
-        share if share <= 0.0 => "nothing on its own".to_owned(),
-        share if share < LEAST_SHARE_IN_WORDS => "less than 1 %".to_owned(),
-        share if (0.995..1.0).contains(&share) => "over 99 %".to_owned(),
-        share => format!("{:.0} %", 100.0 * share),
-    };
-    let end = if effect.at_bound { ", at the end of its range" } else { "" };
-    match effect.is_tied() {
-        true => format!("{} with {share}{end}", alternatives(effect)),
-        false => format!("{} ({share}{end})", effect.name),
-    }
-}
-
-/// Lists effects that were found but are too small to matter.
-fn too_small(small: &[String]) -> String {
-    match small.is_empty() {
-        true => String::new(),
-        false => format!(" Found, and too small to matter: {}.", small.join(", ")),
-    }
-}
-
-/// Describes parameters at the ends of their tolerances. The cause that pushes them there may also
-/// have distorted the values of the effects.
-fn at_ends(ended: &[(String, f64)]) -> String {
-    let all: Vec<String> =
-        ended.iter().map(|(name, sigmas)| format!("{name} ({sigmas:+.1} tolerances)")).collect();
-    let (are, their) =
-        if all.len() == 1 { ("is", "its tolerance") } else { ("are", "their tolerances") };
-    match all.is_empty() {
-        true => String::new(),
-        false => format!(
-            " {} {are} at the end of {their}: the values that were found may make up for something else.",
-            all.join(" and ")
-        ),
-    }
-}
-
-/// Lists faint effects, for the text after the first sentence.
-fn also_seen(faint: &[String]) -> String {
-    match faint.is_empty() {
-        true => String::new(),
-        false => format!(" Also seen, faint: {}.", faint.join(", ")),
     }
 }

@@ -20,13 +20,13 @@ pub(crate) use laboratory::levels;
 pub(crate) use laws::{Effect, Law};
 pub(crate) use simulator::Measured;
 use stretch_gap::{
-    Description, DescriptionSpec, Noise, Note, ParameterSpec, RandomGenerator, SlowDrift,
-    StageSpec, TrialSpec,
+    Description, DescriptionSpec, Diagnosis, Noise, Note, NoteCode, ParameterSpec, RandomGenerator,
+    SlowDrift, StageSpec, TrialSpec,
 };
 
-/// The text of each note.
-pub(crate) fn texts(notes: &[Note]) -> Vec<String> {
-    notes.iter().map(Note::to_string).collect()
+/// The texts of the notes with a code.
+pub(crate) fn noted(told: &Diagnosis, code: NoteCode) -> Vec<String> {
+    told.notes.iter().filter(|note| note.code == code).map(Note::to_string).collect()
 }
 
 /// A simulator and its bench.

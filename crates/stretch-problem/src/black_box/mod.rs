@@ -86,7 +86,7 @@ pub use states::State;
 /// });
 /// let bench = BlackBox::new(problem, Arc::new(spring));
 /// let (diagnosis, _) = diagnose(&bench, &Options::default(), &|_| (), &|| false)?;
-/// assert_eq!(diagnosis.named, ["output.skew"]);
+/// assert_eq!(diagnosis.named(), ["output.skew"]);
 /// assert!(bench.model_runs() < diagnosis.simulations);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```

@@ -142,9 +142,9 @@ fn compared(
         );
     }
     let Examined { diagnosis, evidence, .. } = examined;
-    let found = evidence.candidates.first().filter(|_| !diagnosis.named.is_empty());
+    let found = evidence.candidates.first().filter(|_| !diagnosis.named().is_empty());
     let mut start = found.unwrap_or(&evidence.retuned).clone();
-    start.effects.retain(|(e, _)| diagnosis.named.contains(&simulator.effects()[*e].name));
+    start.effects.retain(|(e, _)| diagnosis.named().contains(&simulator.effects()[*e].name));
     let noise: Vec<f64> = evidence.stages.iter().map(|s| s.noise).collect();
     progress("fitting all runs together");
     let samples: usize = simulator.trials().iter().map(|t| t.samples).sum();

@@ -85,8 +85,8 @@ pub struct GaugeSetup<'a> {
 ///     catalogue: &Catalogue::default(),
 /// })?;
 /// let (diagnosis, _) = diagnose(&gauge, &Options::default(), &|_| (), &|| false)?;
-/// assert_eq!(diagnosis.verdict, VerdictKind::Effect);
-/// assert_eq!(diagnosis.named, ["channel_skew"]);
+/// assert_eq!(diagnosis.verdict(), VerdictKind::Effect);
+/// assert_eq!(diagnosis.named(), ["channel_skew"]);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Debug)]

@@ -70,7 +70,6 @@ pub struct Where {
     pub slices: Vec<SliceGap>,
     /// Shares of the stages in the gap of the last output if the stages run in a chain, driven by
     /// the commands only. Empty if the stages cannot be run in a chain.
-    #[serde(default)]
     pub end_to_end: Vec<StageShare>,
 }
 

@@ -10,26 +10,34 @@ use crate::{
     evidence::{
         candidates::Candidate,
         gathered::{Evidence, Excess},
+        probability::Posterior,
         sanity::{AtBounds, Sanity},
         shares::EffectShare,
     },
     missing::Proposed,
     problem::{column::Column, record_facts::RowsUsed, simulator::Simulator},
     record::gross::Gross,
-    toys::{Effect, Law, Measured, Toy},
     verdict::{
-        answer::{Answer, Findings},
+        answer::Answer,
         coverage::TooLittle,
         diagnosis::{Diagnosis, NextExperiment, Unexplained, VerdictKind},
-        judge::{Judged, Overruled},
+        judge,
         naming::Naming,
         notes::answer_notes,
+        tests::line_and_lag,
     },
 };
 
 const PLAY: &str = "lag.output.backlash";
 const LAG: &str = "line.input.lag";
 const LOOP: &str = "lag.output.bouc_wen";
+
+/// What overrides an answer.
+#[derive(Clone)]
+enum Overruled {
+    AtBounds(AtBounds),
+    TooLittle(TooLittle),
+}
 
 /// An answer defined by its values. By default simulator and rig agree, and there are no findings.
 struct Case {
@@ -146,7 +154,7 @@ fn proposed() -> Proposed {
     from_value(json!({
         "stage": "line", "channel": "y0", "equation": "y0 += 0.31 x^2", "terms": [], "signals": [],
         "time_scales_s": [10.0, 600.0], "initial": "at rest", "closes_held": 0.9, "closes_test": 0.88,
-        "acts": "output y0", "random": false, "log_odds": 12.0,
+        "acts": "output y0", "random": false, "log_odds": 12.0, "predicted": 0.8,
         "sentence": "A term in x^2 closes 88 % of what is left in y0.",
     }))
     .expect("a proposal")
@@ -177,42 +185,36 @@ impl Case {
         simulator: &dyn Simulator,
         (plain, evidence): (&Diagnosis, &Evidence),
     ) -> Diagnosis {
-        let judged = Judged {
-            kind: if self.overruled.is_some() { VerdictKind::Unknown } else { self.seen },
-            seen: self.seen,
-            overruled: self.overruled.clone(),
-            seen_naming: self.naming.clone(),
-        };
         let [raw, retuned, left] = self.gap;
-        let findings = Findings {
-            judged: &judged,
-            gap: Excess { raw, retuned, left },
-            candidates: std::slice::from_ref(&self.first),
-            shares: &self.shares,
-            unexplained: self.unexplained.as_ref(),
-            gross: &self.gross,
-            null_band: 0.02,
-        };
         let mut evidence = evidence.clone();
+        evidence.gap = Excess { raw, retuned, left };
         evidence.roles.borrowed_test = self.borrowed_test;
         evidence.best_effect = self.has_best.then_some(0);
-        let answer = Answer::of(findings, simulator, &evidence);
+        let case = judge::Case {
+            simulator,
+            evidence: &evidence,
+            posterior: &Posterior { sets: Vec::new(), unknown: 0.0, function: None },
+            candidates: std::slice::from_ref(&self.first),
+            shares: &self.shares,
+            sanity: &self.sanity,
+            gross: &self.gross,
+            null_band: 0.02,
+            too_little: None,
+            seed: 1,
+        };
+        let mut answer = case.answer(self.seen, self.naming.clone());
+        if let Answer::Missing { rest, .. } = &mut answer {
+            rest.clone_from(&self.unexplained);
+        }
+        let answer = match &self.overruled {
+            None => answer,
+            Some(Overruled::AtBounds(found)) => found.answer(simulator, answer),
+            Some(Overruled::TooLittle(why)) => Answer::TooLittle { why: *why },
+        };
         let notes = answer_notes(&answer, &self.sanity, simulator, &evidence);
         let proposed = self.proposed.clone();
-        Diagnosis { answer: Some(answer), proposed, notes, ..plain.clone() }
+        Diagnosis { answer, proposed, notes, ..plain.clone() }
     }
-}
-
-/// Returns a simulator of a line followed by a lag, with its diagnosis and evidence. Most of the
-/// gap is in the lag.
-fn line_and_lag() -> (Measured, Diagnosis, Evidence) {
-    let toy = Toy { trials: vec![(600, false), (400, true)], ..Toy::of(&[Law::Line, Law::Lag]) };
-    let measured = toy.may_lack(&[Effect::Quadratic]).measured(1);
-    let (diagnosis, mut evidence) = measured.diagnosed();
-    for (stage, excess) in evidence.stages.iter_mut().zip([0.5, 7.0]) {
-        (stage.excess_retuned, stage.excess_after) = (excess, excess);
-    }
-    (measured, diagnosis, evidence)
 }
 
 fn cases(simulator: &dyn Simulator) -> Vec<(&'static str, Case)> {
@@ -344,9 +346,9 @@ fn every_answer_has_its_words() {
         text.extend(told.notes.iter().map(|note| format!("note: {note}\n")));
         text.push('\n');
         values.insert(name.into(), json!(told.answer));
-        if let Some(Answer::Unknown { .. }) = told.answer {
+        if let Answer::Unknown { .. } = told.answer {
             let mut only = told.clone();
-            if let Some(Answer::Unknown { stage, .. }) = &mut only.answer {
+            if let Answer::Unknown { stage, .. } = &mut only.answer {
                 *stage = "simulator".into();
             }
             assert!(only.headline().starts_with("There is a gap in the simulator that"), "{text}");
@@ -362,8 +364,8 @@ fn every_answer_has_its_words() {
         let _ =
             writeln!(text, "# budget spent, {} left\n{}\n", rest.len(), cut.preface().trim_end());
     }
-    let agrees = Some(Answer::Agrees { small: Vec::new() });
-    let gauge = Diagnosis { answer: agrees, proposed: None, gauge_alone: true, ..plain.clone() };
+    let answer = Answer::Agrees { small: Vec::new() };
+    let gauge = Diagnosis { answer, proposed: None, gauge_alone: true, ..plain.clone() };
     let _ = writeln!(text, "# gauge alone\n{}\n", gauge.headline());
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/verdict/tests");
     is_in_file(&folder.join("sentences.txt"), &text);

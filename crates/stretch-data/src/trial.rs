@@ -46,13 +46,13 @@ pub fn check_rows<'a>(
     if rows <= most { Ok(()) } else { Err(DataError::TooLong { rows, most }) }
 }
 
-/// Whether the times are the numbers of rows: 0, 1, 2, ... See [`Trial::counts_rows`].
+/// Whether the times are the numbers of at least two rows: 0, 1, 2, ... See [`Trial::counts_rows`].
 ///
 /// ```
 /// assert!(stretch_data::are_row_numbers(&[0.0, 1.0]) && !stretch_data::are_row_numbers(&[0.0, 0.1]));
 /// ```
 pub fn are_row_numbers(time_s: &[f64]) -> bool {
-    time_s.iter().zip(0_u32..).all(|(time_s, row)| *time_s == f64::from(row))
+    time_s.len() > 1 && time_s.iter().zip(0_u32..).all(|(time_s, row)| *time_s == f64::from(row))
 }
 
 impl Trial {

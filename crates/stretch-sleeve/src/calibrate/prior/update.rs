@@ -42,7 +42,7 @@ pub struct UpdateSummary {
 }
 
 /// Smallest error that is doubted, as a multiple of the errors of a prior's sessions on their own samples.
-const UNUSUAL_ERROR: f64 = 3.0;
+const UNUSUAL_ERROR: f64 = 4.0;
 
 /// Root mean square distance of the coefficients from the mean of the prior, in its standard deviations, from which the
 /// recording is doubted.

@@ -54,7 +54,7 @@ pub(super) fn lock(folder: &Path) -> Option<File> {
 /// Links the user's own files in the old folder into the new one, and syncs the new folder to disk.
 pub(super) fn complete(new: &Path, old: &Path) -> io::Result<()> {
     if let Ok(meta) = fs::metadata(old) {
-        carry(old, new, &mut BTreeSet::new())?;
+        carry(old, new, &mut BTreeSet::new(), check_output)?;
         fs::set_permissions(new, meta.permissions())?;
     }
     sync_tree(new)
@@ -82,7 +82,7 @@ pub(super) fn replace(draft: &mut Draft) -> io::Result<()> {
     let _locked = draft.replaced.take().or_else(|| lock(real));
     exchange(new, real)?;
     // Carries over files that were added to the old folder in the meantime.
-    carry(new, real, &mut BTreeSet::new()).map_err(|why| {
+    carry(new, real, &mut BTreeSet::new(), |_| Ok(())).map_err(|why| {
         // The old folder is not removed, because it contains files of the user.
         let left = std::mem::take(&mut draft.temporary);
         io::Error::other(format!(
@@ -113,10 +113,13 @@ fn exchange(new: &Path, real: &Path) -> io::Result<()> {
 /// links are impossible, as a copy.
 ///
 /// If `new` is a data set, unchanged trials of the old data set (`replaced`) are not carried over.
-///
-/// # Errors
-/// A file that is not carried over and that this process has read.
-fn carry(old: &Path, new: &Path, replaced: &mut BTreeSet<PathBuf>) -> io::Result<()> {
+/// `check` is called for every file that is not carried over.
+fn carry(
+    old: &Path,
+    new: &Path,
+    replaced: &mut BTreeSet<PathBuf>,
+    check: fn(&Path) -> io::Result<()>,
+) -> io::Result<()> {
     if new.join("dataset.toml").is_file() {
         replaced.extend(unchanged_trials(old));
     }
@@ -132,12 +135,12 @@ fn carry(old: &Path, new: &Path, replaced: &mut BTreeSet<PathBuf>) -> io::Result
                     "{name} is a {kind}, but its new version is not"
                 )));
             }
-            Ok(_) => check_output(&from)?,
+            Ok(_) => check(&from)?,
             Err(_) if is_folder => {
                 fs::create_dir(&to)?;
                 fs::set_permissions(&to, entry.metadata()?.permissions())?;
             }
-            Err(_) if replaced.contains(&from) => check_output(&from)?,
+            Err(_) if replaced.contains(&from) => check(&from)?,
             Err(_) => {
                 ask("link")?;
                 match fs::hard_link(&from, &to) {
@@ -148,7 +151,7 @@ fn carry(old: &Path, new: &Path, replaced: &mut BTreeSet<PathBuf>) -> io::Result
             }
         }
         if is_folder {
-            carry(&from, &to, replaced)?;
+            carry(&from, &to, replaced, check)?;
         }
     }
     Ok(())

@@ -100,7 +100,7 @@ fn a_refusal_names_the_option_and_the_input() {
     for (line, parts) in [
         (
             "convert a.csv --out ./a.csv",
-            ["--out ./a.csv: this file is a recording", "remove this one first"],
+            ["a.csv: cannot open it", "--out ./a.csv would overwrite it"],
         ),
         (
             "apply --calibration cal.json a.csv --out cal.json",

@@ -44,7 +44,7 @@ const EXCHANGES: usize = 2;
 
 /// Number of cached screens. It is large enough that the screen that selected an effect is still
 /// cached when alternatives to that effect are searched.
-const LOOKED: usize = 8;
+const LOOKED: usize = 4;
 
 /// The search over sets of effects.
 pub(crate) struct Search<'a> {
@@ -228,14 +228,15 @@ impl<'a> Search<'a> {
         let round = best.effects.len() + 1;
         let untried = self.problem.simulator().effects().len() - best.effects.len();
         progress(&format!("trying effects, round {round}: {untried}"));
-        let looks = self.looks(best)?;
+        let looked = self.look(best)?;
+        let Looked { ground, screened } = &*looked;
         let kept = if best.effects.is_empty() { KEPT } else { KEPT_LATER };
-        let list = each_once(looks.iter().map(|l| self.shortlist(best, &l.screened, kept)));
+        let list = self.shortlist(best, screened, kept);
         if list.is_empty() {
             return Ok(None);
         }
         progress(&format!("fitting effects, round {round}: {}", list.len()));
-        let found = self.sets.extend_all(best, &looks[0].ground, &list, best.score)?;
+        let found = self.sets.extend_all(best, ground, &list, best.score)?;
         if found.is_empty() {
             return Ok(None);
         }
@@ -266,19 +267,6 @@ impl<'a> Search<'a> {
             best = less;
         }
         Ok(best)
-    }
-
-    /// Returns the screen around a set. If the set is [bent](Sets::is_bent), the screen around the
-    /// same set with the parameters as shipped follows: parameters at the ends of their tolerances
-    /// may have absorbed an effect, which then has nothing left to explain.
-    pub(crate) fn looks(&mut self, base: &Hypothesis) -> Result<Vec<Arc<Looked>>, GapError> {
-        let mut looks = vec![self.look(base)?];
-        if self.sets.is_bent(base, 0..base.misfits.len()) {
-            let mut straight = base.clone();
-            straight.model.parameters.clone_from(&self.problem.shipped.parameters);
-            looks.extend(if_possible(self.look(&straight))?);
-        }
-        Ok(looks)
     }
 
     /// Screens every effect that is not in `base`, or returns the cached screen of its model.
@@ -338,12 +326,23 @@ impl<'a> Search<'a> {
                 break;
             }
             let less = self.sets.without(best, effect)?;
-            let looks = self.looks(&less)?;
-            let others = |l: &Arc<Looked>| self.alternatives(best, effect, &l.screened, kept);
-            let list = each_once(looks.iter().map(others));
-            for solution in self.sets.extend_all(&less, &looks[0].ground, &list, best.score)? {
+            let looked = self.look(&less)?;
+            let Looked { ground, screened: all } = &*looked;
+            let own_gain = all.iter().find(|s| s.effect == effect).map_or(0.0, Screened::gain);
+            let screened: Vec<&Screened> =
+                all.iter().filter(|s| !best.effects.contains(&s.effect)).collect();
+            let catalogue = self.problem.simulator().effects();
+            let twins = &catalogue[effect].twins;
+            let is_twin = |s: &Screened| twins.contains(&catalogue[s.effect].name);
+            let list: Vec<Screened> = screened
+                .iter()
+                .take(kept)
+                .filter(|s| s.gain() > RIVALRY * own_gain)
+                .chain(screened.iter().filter(|s| is_twin(s) && s.gain() <= RIVALRY * own_gain))
+                .map(|s| (*s).clone())
+                .collect();
+            for solution in self.sets.extend_all(&less, ground, &list, best.score)? {
                 let new = solution.effects.iter().find(|e| !less.effects.contains(e));
-                let catalogue = self.problem.simulator().effects();
                 if new.is_some_and(|new| !solution.is_at_bound(*new, catalogue)) {
                     out.push((effect, solution));
                 }
@@ -351,39 +350,4 @@ impl<'a> Search<'a> {
         }
         Ok(out)
     }
-
-    /// Returns the effects of a screen that may replace `effect` in `best`: those with a large gain,
-    /// and the twins of `effect`.
-    fn alternatives(
-        &self,
-        best: &Hypothesis,
-        effect: usize,
-        all: &[Screened],
-        kept: usize,
-    ) -> Vec<Screened> {
-        let own_gain = all.iter().find(|s| s.effect == effect).map_or(0.0, Screened::gain);
-        let screened: Vec<&Screened> =
-            all.iter().filter(|s| !best.effects.contains(&s.effect)).collect();
-        let catalogue = self.problem.simulator().effects();
-        let twins = &catalogue[effect].twins;
-        let is_twin = |s: &Screened| twins.contains(&catalogue[s.effect].name);
-        screened
-            .iter()
-            .take(kept)
-            .filter(|s| s.gain() > RIVALRY * own_gain)
-            .chain(screened.iter().filter(|s| is_twin(s) && s.gain() <= RIVALRY * own_gain))
-            .map(|s| (*s).clone())
-            .collect()
-    }
-}
-
-/// Joins lists of screened effects, without those that an earlier list contains.
-fn each_once(lists: impl Iterator<Item = Vec<Screened>>) -> Vec<Screened> {
-    let mut all: Vec<Screened> = Vec::new();
-    for list in lists {
-        let is_new = |o: &Screened| all.iter().all(|l| l.effect != o.effect);
-        let new: Vec<Screened> = list.into_iter().filter(is_new).collect();
-        all.extend(new);
-    }
-    all
 }

@@ -102,10 +102,13 @@ impl Trial {
     /// # Ok::<(), stretch_data::DataError>(())
     /// ```
     pub fn require(&self, name: &str) -> Result<&[f64], DataError> {
+        self.channel(self.full_name(name)).ok_or_else(|| self.missing(name))
+    }
+
+    /// Returns the error that there is no channel called `name`.
+    pub(crate) fn missing(&self, name: &str) -> DataError {
         let names = self.channels.iter().map(|channel| channel.name.as_str());
-        self.channel(self.full_name(name)).ok_or_else(|| {
-            DataError::missing_column(&self.name, name, iter::once("time_s").chain(names))
-        })
+        DataError::missing_column(&self.name, name, iter::once("time_s").chain(names))
     }
 
     /// Returns the CRC-32C of the values of some columns, row by row. It identifies a trial

@@ -153,7 +153,8 @@ impl Wrap {
 }
 
 impl Trial {
-    /// Returns a channel, unwrapped if it is a wrapped angle.
+    /// Returns the channel called `name`, unwrapped if it is a wrapped angle. The full name is needed, because its unit
+    /// tells whether it is an angle.
     ///
     /// # Errors
     /// [`DataError::MissingColumn`](crate::DataError::MissingColumn).
@@ -169,7 +170,7 @@ impl Trial {
     /// # Ok::<(), stretch_data::DataError>(())
     /// ```
     pub fn unwrapped(&self, name: &str) -> Result<(Cow<'_, [f64]>, Option<Wrap>), DataError> {
-        let values = self.require(name)?;
+        let values = self.channel(name).ok_or_else(|| self.missing(name))?;
         let Some(wrap) = Wrap::of(name, values, &self.time_s) else {
             return Ok((values.into(), None));
         };

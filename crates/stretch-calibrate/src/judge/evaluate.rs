@@ -209,7 +209,7 @@ pub fn evaluate_methods(
     let mut unwrapped = Vec::new();
     for trial in trials {
         trial.check_lengths()?;
-        unwrapped.push(trial.unwrapped(all.reference)?);
+        unwrapped.push(trial.unwrapped(trial.full_name(all.reference))?);
     }
     let turn = unwrapped.iter().find_map(|(_, wrap)| wrap.map(|wrap| wrap.turn));
     for (trial, (reference, _)) in trials.iter().zip(unwrapped) {

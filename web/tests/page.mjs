@@ -114,7 +114,7 @@ const same = async () => {
   await press(page, "see-diagnosis");
   check((await frame.locator(".verdict").first().innerText()).length > 20, "its report opens in place");
   check((await saved(page, "save-rig")).text.includes("[[effect]]"), "the rig that agrees is saved");
-  check(JSON.parse((await saved(page, "save-diagnosis")).text).schema === 1, "the diagnosis is saved");
+  check(JSON.parse((await saved(page, "save-diagnosis")).text).schema === 2, "the diagnosis is saved");
   if (shots) await page.screenshot({ path: join(shots, "page-1280.png"), fullPage: true });
   await page.context().close();
 };

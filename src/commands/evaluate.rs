@@ -27,8 +27,7 @@ use crate::table::table_text;
 /// Prints the measures of the published method ("the paper") for the raw signal
 /// (scaled so that its extremes match those of the reference) and for each
 /// calibration: average error, RMSE, R^2, lag. For a calibration of several gauges, it
-/// also prints them for each gauge alone, in
-/// place of the raw signal.
+/// also prints them for each gauge alone, in place of the raw signal.
 /// Paired t tests compare them, on samples as in the paper, and on means of half-second
 /// blocks because the samples of one motion are not independent.
 ///

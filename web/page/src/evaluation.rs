@@ -52,7 +52,8 @@ pub(crate) fn evaluate_record(files: &Files) -> Result<Errors, Said> {
     let (named, trials) = ([(name.as_str(), gauge.calibration())], files.evaluated()?);
     let evaluation = evaluate(&named, &trials)?;
     let doubts = evaluation_doubts(&named, &trials, &evaluation);
-    let sentence = errors_in_words(&evaluation.pooled, &evaluation.unit, |_| format!("Calibration {name}"));
+    let sentence =
+        errors_in_words(&evaluation.pooled, &evaluation.unit, |_| format!("Calibration {name}"));
     Ok(Errors::of(sentence.unwrap_or_default(), &evaluation, &doubts))
 }
 

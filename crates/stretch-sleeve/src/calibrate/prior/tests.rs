@@ -480,12 +480,11 @@ fn a_recording_that_does_not_fit_the_prior_is_doubted() {
         let trials = [trial];
         prior.update(&trials, &SleeveOptions::default()).unwrap().doubts
     };
-    for wearer in 0..8 {
-        for seconds in [10.0, 30.0] {
-            let found = doubts(session(wearer, 5, seconds));
-            assert!(found.is_empty(), "{wearer}, {seconds} s: {found:?}");
-        }
-    }
+    // One error in twenty lies outside of the interval of 95 %: more than two of 16 happen once in
+    // twenty times.
+    let healthy = (0..8).flat_map(|wearer| [10.0, 30.0].map(|seconds| session(wearer, 5, seconds)));
+    let alarms: Vec<_> = healthy.flat_map(doubts).collect();
+    assert!(alarms.len() <= 2, "{alarms:?}");
     let changed = |change: &dyn Fn(usize, f64) -> f64| {
         let mut trial = session(9, 0, 30.0);
         let values = &mut trial.channels[0].values;

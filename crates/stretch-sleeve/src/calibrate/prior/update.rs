@@ -219,7 +219,7 @@ impl Prior {
             "check the sensor and the columns, or calibrate without --prior on a longer recording";
         if rmse > within {
             return Some(format!(
-                "this recording does not fit the prior: on it, the updated calibration is off by {rmse:.3} {} (RMSE), and nearly all errors of \
+                "this recording does not fit the prior: on it, the updated calibration is off by {rmse:.3} {} (RMSE), and 95 % of the errors of \
                  earlier sessions were within {within:.3} {0}; {what}",
                 self.unit()
             ));

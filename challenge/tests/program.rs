@@ -77,7 +77,7 @@ fn a_case_is_diagnosed_away_from_its_label() {
     let answer = json(&case.join("diagnosis.json"));
     assert_eq!(
         (answer["data_set"].as_str(), answer["schema"].as_u64()),
-        (Some("case-000"), Some(1))
+        (Some("case-000"), Some(2))
     );
     assert_eq!(fs::read_dir(&rooms).unwrap().count(), 0);
     // a case that cannot be diagnosed says why, and is no answer

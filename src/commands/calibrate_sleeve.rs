@@ -32,7 +32,6 @@ struct Made {
     rmse: Option<f64>,
     carried: Vec<Carried>,
     update: Option<UpdateSummary>,
-    doubts: Vec<String>,
     notes: Vec<String>,
 }
 
@@ -89,7 +88,6 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
     let one = |reference: &String| make(prior.as_ref(), &trials, options(reference));
     let made: Result<Vec<Made>, _> = references.iter().map(one).collect();
     let made = made.map_err(of_trials)?;
-    made.iter().flat_map(|made| &made.doubts).for_each(doubt);
     copied_signals(&trials, &signals).iter().for_each(doubt);
     let mut outputs = Outputs::default();
     let records: Vec<PathBuf> = match &references[..] {
@@ -124,21 +122,19 @@ fn make(
     trials: &[Trial],
     options: SleeveOptions,
 ) -> Result<Made, SleeveError> {
-    let (calibration, own, update, doubts, notes) = match prior {
+    let (calibration, own, update, notes) = match prior {
         Some(prior) => {
-            let SleeveFit { calibration, summary, doubts, notes } =
-                prior.update(trials, &options)?;
-            (calibration, None, Some(summary), doubts, notes)
+            let SleeveFit { calibration, summary, notes } = prior.update(trials, &options)?;
+            (calibration, None, Some(summary), notes)
         }
         None => {
-            let SleeveFit { calibration, summary, doubts, notes } =
-                calibrate_array(trials, &options)?;
-            (calibration, Some(summary), None, doubts, notes)
+            let SleeveFit { calibration, summary, notes } = calibrate_array(trials, &options)?;
+            (calibration, Some(summary), None, notes)
         }
     };
     let (rmse, carried) = own.map_or((None, Vec::new()), |own| (Some(own.rmse), own.carried));
     let SleeveOptions { reference, signals, .. } = options;
-    Ok(Made { calibration, reference, signals, rmse, carried, update, doubts, notes })
+    Ok(Made { calibration, reference, signals, rmse, carried, update, notes })
 }
 
 /// Adds the report of each calibration to the outputs, and returns their paths.
@@ -187,7 +183,7 @@ fn report(
     let context = Context {
         title: format!("Calibration of {} on {}", made.reference, made.signals.join(", ")),
         calibrated_on: trials.iter().map(|trial| trial.name.clone()).collect(),
-        notes: made.doubts.iter().chain(&made.notes).cloned().collect(),
+        notes: made.notes.clone(),
         ..Context::default()
     };
     Ok(gauges_report(&together, &gauges, &context))

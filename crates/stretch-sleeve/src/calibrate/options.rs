@@ -48,8 +48,6 @@ pub struct SleeveFit<S> {
     pub calibration: SleeveCalibration,
     /// Its errors, or what was assumed.
     pub summary: S,
-    /// Sentences on what may be wrong with the data.
-    pub doubts: Vec<String>,
     /// Notes on the data, and on what the prior knows.
     pub notes: Vec<String>,
 }

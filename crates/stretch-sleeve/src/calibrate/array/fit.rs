@@ -97,7 +97,6 @@ pub fn calibrate_array(
     Ok(SleeveFit {
         calibration: linear.record(Some(&channels), shifts, provenance)?,
         summary: ArraySummary { carried, rmse: held.rmse * unit },
-        doubts: Vec::new(),
         notes,
     })
 }

@@ -141,7 +141,6 @@ impl Prior {
                 &values,
                 (distance, prior_rmse),
             ),
-            doubts: Vec::new(),
             notes,
         })
     }

@@ -471,29 +471,3 @@ fn sessions_that_cannot_share_a_prior_are_named_with_what_to_do() {
         "{error}"
     );
 }
-
-/// A recording that is unlike the sessions of the prior is doubted, in its coefficients or in its errors.
-#[test]
-fn a_recording_that_does_not_fit_the_prior_is_doubted() {
-    let prior = prior(&["s1"]);
-    let doubts = |trial: Trial| {
-        let trials = [trial];
-        prior.update(&trials, &SleeveOptions::default()).unwrap().doubts
-    };
-    // One error in twenty lies outside of the interval of 95 %: more than two of 16 happen once in
-    // twenty times.
-    let healthy = (0..8).flat_map(|wearer| [10.0, 30.0].map(|seconds| session(wearer, 5, seconds)));
-    let alarms: Vec<_> = healthy.flat_map(doubts).collect();
-    assert!(alarms.len() <= 2, "{alarms:?}");
-    let changed = |change: &dyn Fn(usize, f64) -> f64| {
-        let mut trial = session(9, 0, 30.0);
-        let values = &mut trial.channels[0].values;
-        values.iter_mut().enumerate().for_each(|(n, v)| *v = change(n, *v));
-        doubts(trial)
-    };
-    let noisy = changed(&|n, v| v + 0.3 * (n as f64 * 0.7).sin() * (n as f64 * 0.031).cos());
-    let shifted = changed(&|_, v| v + 1.0);
-    for found in [noisy, shifted] {
-        assert!(found.len() == 1 && found[0].contains("does not fit the prior"), "{found:?}");
-    }
-}

@@ -41,13 +41,6 @@ pub struct UpdateSummary {
     pub half_width_95: Option<f64>,
 }
 
-/// Smallest error that is doubted, as a multiple of the errors of a prior's sessions on their own samples.
-const UNUSUAL_ERROR: f64 = 4.0;
-
-/// Root mean square distance of the coefficients from the mean of the prior, in its standard deviations, from which the
-/// recording is doubted.
-const UNUSUAL_COEFFICIENTS: f64 = 3.0;
-
 /// Returns `X'X/n` for a future session, from that of the prior and that of some seconds of the session. Each row of
 /// `X` contains the terms of a sample. One minute of the session has the same weight as the prior.
 fn mixed_gram(prior: &DMatrix<f64>, own: &DMatrix<f64>, seconds: f64) -> DMatrix<f64> {
@@ -103,8 +96,6 @@ impl Prior {
             .map_or(0.0, |channels| channels.reference().count() as f64 / self.sample_rate_hz);
         let predicted = posterior.covariance.component_mul(&gram).sum() + self.noise;
         let [expected_rmse, half_width_95] = self.expect(seconds, known > 0);
-        let misfit = |channels| self.misfit(&bank, channels, [&normal, &posterior], half_width_95);
-        let doubts = channels.as_ref().and_then(misfit).into_iter().collect();
         let variance = self.variance(expected_rmse).unwrap_or(predicted);
         let columns = signals.iter().chain([reference]);
         let provenance = provenance(&options.date, trials, columns).with_time(&options.time);
@@ -118,7 +109,6 @@ impl Prior {
         Ok(SleeveFit {
             calibration: linear.record(channels.as_ref(), None, provenance)?,
             summary: UpdateSummary { seconds, known, expected_rmse, half_width_95 },
-            doubts,
             notes,
         })
     }
@@ -188,51 +178,6 @@ impl Prior {
         let own = all.view((0, 0), (terms, terms)) / f64::max(count, 1.0);
         let mixed = mixed_gram(&self.gram, &own, count / self.sample_rate_hz);
         Ok((Normal { mean, covariance }, mixed))
-    }
-
-    /// Returns a sentence if the recording does not fit the prior. Either the updated calibration has larger errors on
-    /// this recording than 95 % of the errors of earlier sessions, or its coefficients lie far from theirs. The squared
-    /// distance of the coefficients is `(w - m)' S^-1 (w - m)`, for the prior `N(m, S)`. It is divided by the number of
-    /// coefficients that the recording determines, `k - trace(S^-1 P)`, where `P` is the covariance of `w`.
-    fn misfit(
-        &self,
-        bank: &Bank,
-        channels: &Channels,
-        [normal, posterior]: [&Normal; 2],
-        half_width_95: Option<f64>,
-    ) -> Option<String> {
-        let (mut row, mut scratch) = (Vec::new(), (Vec::new(), Vec::new()));
-        let (mut squares, mut count) = (0.0, 0_u32);
-        for stretch in &channels.stretches {
-            for sample in stretch.warmed_up() {
-                bank.fill(stretch.at(sample), &mut row, &mut scratch);
-                let estimate: f64 = row.iter().zip(&posterior.mean).map(|(x, w)| x * w).sum();
-                let target = self.target.from_reference(stretch.reference[sample]);
-                squares += (self.target_range.normalise(target) - estimate).powi(2);
-                count += 1;
-            }
-        }
-        let unit = self.unit_of_target();
-        let rmse = unit * (squares / f64::from(count.max(1))).sqrt();
-        let within = half_width_95.unwrap_or(0.0).max(UNUSUAL_ERROR * unit * self.noise.sqrt());
-        let what =
-            "check the sensor and the columns, or calibrate without --prior on a longer recording";
-        if rmse > within {
-            return Some(format!(
-                "this recording does not fit the prior: on it, the updated calibration is off by {rmse:.3} {} (RMSE), and 95 % of the errors of \
-                 earlier sessions were within {within:.3} {0}; {what}",
-                self.unit()
-            ));
-        }
-        let inverse = cholesky(&normal.covariance)?.inverse();
-        let off = &posterior.mean - &normal.mean;
-        let determined = bank.terms() as f64 - (&inverse * &posterior.covariance).trace();
-        let distance = (off.dot(&(&inverse * &off)) / determined.max(1.0)).sqrt();
-        (distance > UNUSUAL_COEFFICIENTS).then(|| {
-            format!(
-                "this recording does not fit the prior: its coefficients are {distance:.1} standard deviations from those of earlier sessions; {what}"
-            )
-        })
     }
 
     /// Returns the root mean square error of left-out sessions after at most this duration of reference, and half of

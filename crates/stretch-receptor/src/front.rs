@@ -161,10 +161,11 @@ impl<M: Live> Front<M> {
     /// use stretch_receptor::{Receptor, example_observer};
     /// let receptor = Receptor::<f64>::new(&example_observer())?;
     /// let mut memory = receptor.memory();
-    /// let first = receptor.step(&mut memory, Volts(1.5));
-    /// assert_ne!(receptor.step(&mut memory, Volts(1.5)), first);
+    /// receptor.step(&mut memory, Volts(1.5)).expect("a reading");
+    /// let moving = receptor.step(&mut memory, Volts(1.6)).expect("a reading");
     /// receptor.restart(&mut memory);
-    /// assert_eq!(receptor.step(&mut memory, Volts(1.5)), first);
+    /// let begun = receptor.step(&mut memory, Volts(1.6)).expect("a reading");
+    /// assert!(moving.rate != 0.0 && begun.rate == 0.0);
     /// # Ok::<(), stretch_receptor::ReceptorError>(())
     /// ```
     pub fn restart(&self, memory: &mut ReceptorMemory<M::Memory, M::Side>) {

@@ -234,15 +234,15 @@ impl Held<'_> {
 /// use stretch_calibrate::without_clipped;
 /// use stretch_data::{Channel, Trial};
 ///
-/// let length: Vec<f64> = (0..400).map(|n| 165.0 - 15.0 * (0.05 * f64::from(n)).cos()).collect();
+/// let length: Vec<f64> = (0..1000).map(|n| 165.0 - 15.0 * (0.02 * f64::from(n)).cos()).collect();
 /// let voltage = length.iter().map(|x| (0.01 * x).min(1.75)).collect();
 /// let channel = |name: &str, values| Channel { name: name.into(), values };
-/// let time_s = (0..400).map(|n| 0.01 * f64::from(n)).collect();
+/// let time_s = (0..1000).map(|n| 0.01 * f64::from(n)).collect();
 /// let channels = vec![channel("length_mm", length), channel("bridge_v", voltage)];
 /// let trial = Trial { name: "a.csv".into(), time_s, channels };
 /// let (kept, sentences) = without_clipped(vec![trial], ["bridge_v", "length_mm"]);
-/// assert!(kept[0].channel("bridge_v").is_some_and(|v| v.len() < 300 && v.iter().all(|v| *v < 1.75)));
-/// assert!(sentences[0].contains("of 400 samples of a.csv are left out"), "{}", sentences[0]);
+/// assert!(kept[0].channel("bridge_v").is_some_and(|v| v.len() < 800 && v.iter().all(|v| *v < 1.75)));
+/// assert!(sentences[0].contains("of 1000 samples of a.csv are left out"), "{}", sentences[0]);
 /// ```
 pub fn without_clipped(
     trials: Vec<Trial>,

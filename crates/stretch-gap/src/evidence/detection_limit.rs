@@ -70,7 +70,7 @@ const POWERS: [f64; 2] = [0.5, 60.0];
 ///
 /// ```
 /// let limit: stretch_gap::DetectionLimit =
-///     serde_json::from_str(r#"{ "effect": "leak", "parameter": "g", "strength": null, "unit": "1/s" }"#)?;
+///     serde_json::from_str(r#"{ "effect": "leak", "parameter": "g", "strength": null, "unit": "1/s", "others": {} }"#)?;
 /// assert_eq!(limit.strength, None); // these data do not show it at any strength that makes sense
 /// # Ok::<(), serde_json::Error>(())
 /// ```

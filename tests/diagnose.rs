@@ -99,7 +99,7 @@ fn a_simulated_effect_is_named_and_reported() {
         value
     };
     let d = read(&json);
-    assert_eq!((d["schema"].as_u64(), d["verdict"].as_str()), (Some(1), Some("effect")));
+    assert_eq!((d["schema"].as_u64(), d["verdict"].as_str()), (Some(2), Some("effect")));
     assert_eq!(d["named"][0], "gauge_hysteresis");
     let best = &d["candidates"][0];
     assert!(best["parameters"].is_object() && best["closed"].as_f64().unwrap() > 0.8, "{best}");

@@ -263,3 +263,13 @@ fn clipped_samples_are_left_out_at_either_end() {
         );
     }
 }
+
+/// A trial with columns of unequal length stays as it is, because the fit refuses it.
+#[test]
+fn columns_of_unequal_length_are_not_searched_for_clipped_samples() {
+    let mut torn = trial(0);
+    change(&mut torn, SIGNAL, |v| v.min(1.9));
+    torn.channels[0].values.truncate(100);
+    let columns = ["bridge_v", "length_mm"];
+    assert_eq!(without_clipped(vec![torn.clone()], columns), (vec![torn], Vec::new()));
+}

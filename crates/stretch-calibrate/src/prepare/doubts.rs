@@ -278,12 +278,14 @@ pub(crate) fn clipped(trial: &Trial, [signal, reference]: [&str; 2]) -> Option<S
     held(trial, [signal, reference], |held| held.clipped(signal, reference))
 }
 
-/// Examines the signal and the reference of a whole trial.
+/// Examines the signal and the reference of a whole trial. Returns `None` for columns of unequal length, because the fit
+/// refuses them.
 fn held<T>(
     trial: &Trial,
     columns: [&str; 2],
     examine: impl FnOnce(&Held<'_>) -> Option<T>,
 ) -> Option<T> {
+    trial.check_lengths().ok()?;
     let [Ok(signals), Ok(references)] = columns.map(|name| trial.require(name)) else {
         return None;
     };

@@ -17,7 +17,7 @@ use stretch_calibrate::{
 };
 use stretch_core::RateEstimator;
 use stretch_data::files::{Outputs, read_whole};
-use stretch_data::{Split, Trial};
+use stretch_data::{Split, Trial, full_name};
 use stretch_gap::Diagnosis;
 use stretch_problem::{Causes, causes, name_of};
 use stretch_recording::{ReadOptions, RecordingError, tidy_column};
@@ -599,8 +599,7 @@ fn verdict(
 
 /// Returns the full names of columns in the first trial.
 pub(super) fn full_names(trials: &[Trial], names: &[String]) -> Vec<String> {
-    let full = |name: &String| trials.first().map_or(&**name, |trial| trial.full_name(name)).into();
-    names.iter().map(full).collect()
+    names.iter().map(|name| full_name(trials.first(), name)).collect()
 }
 
 /// Returns the columns of the first trial, except those in `but` and the estimates of `stretch listen` or of the live

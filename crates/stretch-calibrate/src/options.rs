@@ -284,8 +284,7 @@ impl Options {
 
     /// Returns the options with the full names of their columns in the trials, such as `voltage_v` for `Voltage`.
     pub fn named_as(&self, trials: &[stretch_data::Trial]) -> Self {
-        let full =
-            |name: &str| trials.first().map_or(name, |trial| trial.full_name(name)).to_owned();
+        let full = |name: &str| stretch_data::full_name(trials.first(), name);
         Self { signal: full(&self.signal), reference: full(&self.reference), ..self.clone() }
     }
 

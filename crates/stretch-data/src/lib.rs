@@ -25,7 +25,7 @@ pub use rig_file::{EffectEntry, Parameter, RigFile, from_zero};
 pub use toml_file::TomlFile;
 pub use toml_text::{Remarks, toml_comment};
 pub use trial::{
-    Channel, Trial, are_row_numbers, check_rows, ends, out_of_order, rate_of, tidy_time,
+    Channel, Trial, are_row_numbers, check_rows, ends, full_name, out_of_order, rate_of, tidy_time,
 };
 pub use wrap::{Wrap, follow_turns};
 pub use write::{can_name, push_number};

@@ -55,6 +55,18 @@ pub fn are_row_numbers(time_s: &[f64]) -> bool {
     time_s.len() > 1 && time_s.iter().zip(0_u32..).all(|(time_s, row)| *time_s == f64::from(row))
 }
 
+/// Returns the [full name](Trial::full_name) of a column in the first of several trials; without a trial, the name as it is.
+///
+/// ```
+/// use stretch_data::{Channel, Trial, full_name};
+/// let channel = Channel { name: "voltage_v".into(), values: vec![1.5] };
+/// let trial = Trial { time_s: vec![0.0], channels: vec![channel], ..Trial::default() };
+/// assert_eq!([full_name(Some(&trial), "Voltage"), full_name(None, "Voltage")], ["voltage_v", "Voltage"]);
+/// ```
+pub fn full_name(first: Option<&Trial>, name: &str) -> String {
+    first.map_or(name, |first| first.full_name(name)).to_owned()
+}
+
 impl Trial {
     /// Returns the number of samples.
     pub fn len(&self) -> usize {

@@ -2,7 +2,7 @@
 
 use std::{path::Path, sync::Arc};
 
-use stretch_data::{DataSet, SessionTrial, Split, ends};
+use stretch_data::{DataSet, SessionTrial, Split, ends, full_name};
 use stretch_gap::noise_variance;
 use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::Tolerance;
@@ -112,8 +112,7 @@ pub(crate) fn read_sensors(
         true => Recording::session(&DataSet::read(path)?, path, &options)?,
         false => vec![SessionTrial::from(Recording::read(path, &options)?)],
     };
-    let full =
-        |name: &str| trials.first().map_or(name, |first| first.trial.full_name(name)).to_owned();
+    let full = |name: &str| full_name(trials.first().map(|first| &first.trial), name);
     let (reference, signals) = (full(reference), signals.into_iter().map(full));
     let signals: Vec<String> = signals.collect();
     let signals: Vec<&str> = signals.iter().map(String::as_str).collect();

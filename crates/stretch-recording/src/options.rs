@@ -70,19 +70,6 @@ impl TimeUnit {
         Self::deserialize(StrDeserializer::<serde::de::value::Error>::new(text)).ok()
     }
 
-    /// Returns the abbreviation of the unit: s, ms, us, ns, min, h or d.
-    pub(crate) fn abbreviation(self) -> &'static str {
-        match self {
-            Self::Seconds => "s",
-            Self::Milliseconds => "ms",
-            Self::Microseconds => "us",
-            Self::Nanoseconds => "ns",
-            Self::Minutes => "min",
-            Self::Hours => "h",
-            Self::Days => "d",
-        }
-    }
-
     /// Returns the unit that is the last word of a column's name, in upper or lower case.
     ///
     /// ```

@@ -2,6 +2,8 @@
 
 use std::{fmt, str::FromStr};
 
+use serde::Serialize;
+
 use crate::options::{DateOrder, ReadOptions, TIME, TimeUnit};
 
 /// The source of a recording's time, as users write it: a column, with a unit or an order of dates behind a colon, or a rate.
@@ -63,7 +65,10 @@ impl fmt::Display for TimeColumn {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Named(name, None) => f.write_str(name),
-            Self::Named(name, Some(unit)) => write!(f, "{name}:{}", unit.abbreviation()),
+            Self::Named(name, Some(unit)) => {
+                write!(f, "{name}:")?;
+                unit.serialize(f)
+            }
             Self::Dated(name, DateOrder::DayFirst) => write!(f, "{name}:dmy"),
             Self::Dated(name, DateOrder::MonthFirst) => write!(f, "{name}:mdy"),
             Self::Rate(rate_hz) => write!(f, "{rate_hz}hz"),

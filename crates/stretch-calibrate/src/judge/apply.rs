@@ -96,14 +96,12 @@ impl LiveReceptor {
         let spec = calibration.spec();
         let rate = spec.model.needs_signal_only();
         let rate = rate.then(|| RateFilter::new(spec.rate_estimator, spec.sample_rate_hz));
-        let remembers =
-            matches!(spec.model, Model::Observer(_) | Model::History(_) | Model::Diagnosed(_));
         let samples = |seconds: f64| (seconds * spec.sample_rate_hz.hz()).ceil() as u32;
         let longest = samples(LONGEST_GAP_S).max(MAX_BRIDGED.into());
         Ok(Self {
             rate: rate.transpose()?.map(Runner::new),
             missing: 0,
-            gap: remembers.then(|| (longest, samples(SETTLING_S))),
+            gap: spec.model.has_memory().then(|| (longest, samples(SETTLING_S))),
             settling: 0,
             has_begun: false,
             memory: receptor.memory(),

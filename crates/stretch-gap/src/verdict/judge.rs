@@ -65,7 +65,7 @@ pub(crate) fn judge(case: &Case<'_>, thresholds: &Thresholds) -> Answer {
     let kind = most_probable(case, thresholds);
     let seen = case.answer(kind, case.naming(kind, thresholds));
     if let Some(found) = at_bounds(case).filter(|_| kind != VerdictKind::Record) {
-        return AtBounds::answer(found, case.simulator, seen);
+        return found.answer(case.simulator, seen);
     }
     // An unknown cause may be the most probable only because the recording is short.
     let needs_more =

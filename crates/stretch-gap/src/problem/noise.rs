@@ -32,6 +32,14 @@ const TRIMMED: f64 = 0.1;
 const MEMORIES: [f64; 9] = [1.5, 2.2, 3.3, 5.0, 7.5, 11.0, 17.0, 25.0, 38.0];
 /// Number of values that are tried for the slow part's share of the variance.
 const SHARES: usize = 19;
+/// Number of samples in each of two neighbouring medians, whose difference shows jumps.
+const MEDIAN_OF: usize = 11;
+/// Kurtosis of these differences from which a channel jumps. Normal noise has 3. Noise whose
+/// standard deviation doubles half of the time has 4.1.
+const JUMPING: f64 = 5.0;
+/// Smallest number of windows that show jumps: normal noise reaches a kurtosis of 5 in less than
+/// one of 1000 recordings.
+const FEWEST_OF_JUMPS: usize = 24;
 
 /// Size from which a difference counts as a gross error, in multiples of the median size of
 /// differences. For normal noise this is 8 standard deviations.
@@ -51,6 +59,7 @@ pub struct Noise {
     memory_samples: f64,
     source: String,
     known_to: f64,
+    jumps: bool,
 }
 
 /// Relative standard deviation that is assumed for a variance estimated from second differences. It
@@ -70,7 +79,7 @@ impl Noise {
     }
 
     pub(super) fn white(sd: f64, source: String, known_to: f64) -> Self {
-        Self { white: sd, slow: 0.0, memory_samples: 1.0, source, known_to }
+        Self { white: sd, slow: 0.0, memory_samples: 1.0, source, known_to, jumps: false }
     }
 
     /// Returns the relative standard deviation of the estimated variance; 0 if the noise was
@@ -94,6 +103,12 @@ impl Noise {
         &self.source
     }
 
+    /// Whether the channel jumps at random between levels while the rig is at rest, as a loose
+    /// contact does. The jumps are not part of this noise, and there is no slow noise.
+    pub fn jumps(&self) -> bool {
+        self.jumps
+    }
+
     /// Draws `count` consecutive samples of the noise.
     pub fn samples(&self, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
         if self.slow == 0.0 {
@@ -115,6 +130,16 @@ impl Noise {
     /// false), only the faster half of the waves is used, and slow noise is not estimated. Waves of
     /// the mains (50 and 60 Hz) are left out; `dt_s` is the sample time, s. Returns `None` if there
     /// are too few windows or if all their values are constant.
+    ///
+    /// Jumps between levels have the spectrum of slow noise, but are not normal. They are recognised
+    /// by the kurtosis of
+    ///
+    /// ```text
+    /// d_i = median(x_(i+1) .. x_(i+11)) - median(x_(i-10) .. x_i)
+    /// ```
+    ///
+    /// which is 3 for normal noise of any spectrum. Single outliers hardly change medians. If the
+    /// kurtosis is at least 5, only white noise is estimated, from the faster half of the waves.
     ///
     /// ```
     /// use stretch_gap::{RandomGenerator, Noise, WINDOW};
@@ -145,7 +170,14 @@ impl Noise {
         if !step.is_finite() || powers.iter().all(|p| *p <= 0.0) {
             return None;
         }
-        let fitted = shapes.fit(&powers, whole.len(), stated);
+        let mut fitted = shapes.fit(&powers, whole.len(), stated);
+        // A signal that rests between two steps of its converter jumps between them.
+        let is_above_step = 2.0 * fitted.white > step;
+        if is_still && is_above_step && shapes.kurtosis_of_jumps(&whole) >= JUMPING {
+            let shapes = Shapes::new(false, dt_s);
+            fitted = shapes.fit(&shapes.mean_powers(&whole), whole.len(), stated);
+            fitted.jumps = true;
+        }
         // A converter rounds to its step, which adds uniform errors of variance step^2/12. The
         // noise cannot be smaller than that.
         let rounded = step / 12.0_f64.sqrt();
@@ -202,7 +234,9 @@ fn trimmed_mean(kept: f64) -> f64 {
 
 /// Expected powers of white and of slow noise in a window.
 struct Shapes {
-    /// The transform D M, waves by samples.
+    /// The cosine transform D, waves by samples.
+    cosines: DMatrix<f64>,
+    /// The transform D M.
     transform: DMatrix<f64>,
     white: Vec<f64>,
     /// One entry for each of `MEMORIES`.
@@ -221,7 +255,8 @@ impl Shapes {
         let turn =
             |k: usize, i: usize| std::f64::consts::PI * (i as f64 + 0.5) * k as f64 / n as f64;
         let norm = |k: usize| (if k == 0 { 1.0 } else { 2.0_f64 } / n as f64).sqrt();
-        let transform = DMatrix::from_fn(n, n, |k, i| norm(k) * turn(k, i).cos()) * project;
+        let cosines = DMatrix::from_fn(n, n, |k, i| norm(k) * turn(k, i).cos());
+        let transform = &cosines * project;
         let of = |covariance: &DMatrix<f64>| -> Vec<f64> {
             let half = &transform * covariance;
             (0..n).map(|k| half.row(k).dot(&transform.row(k))).collect()
@@ -233,7 +268,38 @@ impl Shapes {
         let slowest = if is_still { SLOWEST } else { n / 2 };
         let waves = (slowest..n).filter(|k| !is_hum(k)).collect();
         let slow = if is_still { slow.into() } else { Vec::new() };
-        Self { white: of(&DMatrix::identity(n, n)), slow, transform, waves }
+        Self { white: of(&DMatrix::identity(n, n)), slow, cosines, transform, waves }
+    }
+
+    /// Returns the amplitude of every wave of a window without its parabola.
+    fn amplitudes(&self, window: &[f64]) -> DVector<f64> {
+        // The first value is subtracted to keep rounding errors small; the transform removes
+        // constants anyway.
+        let values = DVector::from_iterator(WINDOW, window.iter().map(|x| x - window[0]));
+        &self.transform * values
+    }
+
+    /// Returns the kurtosis of the differences d of [`Noise::of_windows`], from windows without
+    /// their parabolas and without hum; 0 if there are too few windows.
+    fn kurtosis_of_jumps(&self, windows: &[&Vec<f64>]) -> f64 {
+        if windows.len() < FEWEST_OF_JUMPS {
+            return 0.0;
+        }
+        let (mut squares, mut fourths, mut count) = (0.0, 0.0, 0.0);
+        for window in windows {
+            let (all, mut used) = (self.amplitudes(window), DVector::zeros(WINDOW));
+            self.waves.iter().for_each(|&k| used[k] = all[k]);
+            let values = self.cosines.tr_mul(&used);
+            let parts = values.as_slice().windows(MEDIAN_OF);
+            let medians: Vec<f64> = parts.filter_map(|part| median(part.to_vec())).collect();
+            for (before, after) in medians.iter().zip(&medians[MEDIAN_OF..]) {
+                let square = (after - before).powi(2);
+                squares += square;
+                fourths += square * square;
+                count += 1.0;
+            }
+        }
+        count * fourths / (squares * squares).max(f64::MIN_POSITIVE)
     }
 
     /// Returns the mean power of every wave. Each mean omits the largest tenth of the powers, so
@@ -241,10 +307,7 @@ impl Shapes {
     fn mean_powers(&self, windows: &[&Vec<f64>]) -> Vec<f64> {
         let mut powers: Vec<Vec<f64>> = vec![Vec::new(); WINDOW];
         for window in windows {
-            // The first value is subtracted to keep rounding errors small; the transform removes
-            // constants anyway.
-            let values = DVector::from_iterator(WINDOW, window.iter().map(|x| x - window[0]));
-            for (power, x) in powers.iter_mut().zip((&self.transform * values).iter()) {
+            for (power, x) in powers.iter_mut().zip(&self.amplitudes(window)) {
                 power.push(x * x);
             }
         }
@@ -291,7 +354,7 @@ impl Shapes {
                     least = own;
                     let (white, slow) = (((1.0 - share) * all).sqrt(), (share * all).sqrt());
                     let source = "noise of the recording, some of it slow".to_owned();
-                    best = Noise { white, slow, memory_samples, source, known_to };
+                    best = Noise { white, slow, memory_samples, source, known_to, jumps: false };
                 }
             }
         }
@@ -442,8 +505,14 @@ mod tests {
         for (seed, (slow, memory)) in [(0.3, 2.0), (0.5, 7.0), (0.7, 20.0)].into_iter().enumerate()
         {
             let (white, slow) = ((1.0_f64 - slow).sqrt(), f64::sqrt(slow));
-            let truth =
-                Noise { white, slow, memory_samples: memory, source: String::new(), known_to: 0.0 };
+            let truth = Noise {
+                white,
+                slow,
+                memory_samples: memory,
+                source: String::new(),
+                known_to: 0.0,
+                jumps: false,
+            };
             let found =
                 Noise::of_windows(&windows(&truth, 100, seed as u64), Some(1.0), true, 0.01);
             let found = found.expect("enough windows");
@@ -491,5 +560,40 @@ mod tests {
         approx::assert_relative_eq!(found.sd(), 1.0, max_relative = NOISE_LEVEL);
         assert_eq!(Noise::of_windows(&all[..5], None, true, 0.01), None);
         assert_eq!(Noise::of_windows(&vec![vec![2.0; WINDOW]; 50], None, true, 0.01), None);
+    }
+
+    /// Changes a normal value, given its index.
+    type Change<'a> = &'a mut dyn FnMut(usize, f64, &mut RandomGenerator) -> f64;
+
+    /// A contact that jumps by three standard deviations once in 0.8 s has the spectrum of slow
+    /// noise, and is none. Outliers, hum, a level that differs between windows, and a coarse
+    /// converter are not jumps.
+    #[test]
+    fn jumps_are_no_slow_noise() {
+        let mut random = RandomGenerator::new(8, 0);
+        let mut level = 0.0;
+        let mut all = |change: Change<'_>| {
+            let mut window = |w: usize| -> Vec<f64> {
+                (0..WINDOW).map(|i| change(w * WINDOW + i, random.gauss(), &mut random)).collect()
+            };
+            let windows: Vec<Vec<f64>> = (0..60).map(&mut window).collect();
+            Noise::of_windows(&windows, Some(1.0), true, 0.01).expect("enough windows")
+        };
+        let jumping = all(&mut |_, noise, random| {
+            level = if random.unit() < 0.0125 { 3.0 - level } else { level };
+            noise + level
+        });
+        assert!(jumping.jumps() && jumping.slow().0 == 0.0, "{jumping:?}");
+        approx::assert_relative_eq!(jumping.sd(), 1.0, max_relative = NOISE_LEVEL);
+        let others: [Change<'_>; 4] = [
+            &mut |_, noise, random| if random.unit() < 0.01 { 20.0 * noise } else { noise },
+            &mut |i, noise, _| noise + 3.0 * (std::f64::consts::TAU * 0.4 * i as f64).cos(),
+            &mut |i, noise, _| if (i / WINDOW).is_multiple_of(2) { noise } else { 2.0 * noise },
+            &mut |_, noise, _| (0.3 * noise + 0.5).round(),
+        ];
+        for other in others {
+            let other = all(other);
+            assert!(!other.jumps(), "{other:?}");
+        }
     }
 }

@@ -37,6 +37,8 @@ pub enum NoteCode {
     StartsDisagree,
     /// The recorder seems to add slow noise.
     SlowNoise,
+    /// A channel jumps at random between levels while the rig is at rest.
+    Jumps,
     /// The simulator may start from another state than the rig.
     InitialState,
     /// Re-tuned parameters predict test trials worse than those as shipped.

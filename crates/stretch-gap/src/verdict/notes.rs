@@ -18,6 +18,7 @@ use crate::{
         starts::Starts,
     },
     problem::{
+        noise::Noise,
         record_facts::nouns,
         runs::Runs,
         sample_roles::{Role, SampleRoles},
@@ -181,15 +182,22 @@ pub(crate) fn implausible_noise_notes(problem: &PreparedProblem<'_>, sanity: &Sa
     sanity.implausible.iter().map(note).collect()
 }
 
-/// Returns a note for each output to which the recorder seems to add slow noise.
+/// Returns a note for each output that jumps while the rig is at rest, or to which the recorder
+/// seems to add slow noise.
 pub(crate) fn recorder_notes(problem: &PreparedProblem<'_>) -> Vec<Note> {
     let stages = problem.compare.metrics.iter().zip(problem.simulator().stages());
     let note = |(metric, spec): (&Metric, &StageSpec)| {
+        let channel = &spec.channel;
+        if spec.noise.as_ref().is_some_and(Noise::jumps) {
+            let text = format!(
+                "{channel} jumps at random between levels while nothing is commanded: check for a loose contact"
+            );
+            return Some(Note::new(NoteCode::Jumps, text));
+        }
         let (times, time_s) = metric.recorder_drift()?;
         let text = format!(
-            "{} has slow noise with a correlation time of {time_s} s and {times:.2} times the standard deviation of its other noise: it is taken \
-             for noise of the recorder, so a gap as small and as slow would not be found",
-            spec.channel
+            "{channel} has slow noise with a correlation time of {time_s} s and {times:.2} times the standard deviation of its other noise: it is taken \
+             for noise of the recorder, so a gap as small and as slow would not be found"
         );
         Some(Note::new(NoteCode::SlowNoise, text))
     };

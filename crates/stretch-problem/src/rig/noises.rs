@@ -30,9 +30,9 @@ pub(super) struct Noises {
     pub(super) length_mm: Noise,
     pub(super) volts: Noise,
     pub(super) pressure_kpa: Noise,
-    pub(super) length_drift: SlowDrift,
-    pub(super) volts_drift: SlowDrift,
-    pub(super) pressure_drift: SlowDrift,
+    pub(super) length_drift: Option<SlowDrift>,
+    pub(super) volts_drift: Option<SlowDrift>,
+    pub(super) pressure_drift: Option<SlowDrift>,
 }
 
 impl Noises {
@@ -52,9 +52,10 @@ impl Noises {
             Noise::of_windows(&windows, Some(stated), quiet.is_still, columns.dt_s)
                 .unwrap_or_else(|| Noise::known(stated))
         };
-        let drift = |stated: f64, noise: &Noise| SlowDrift {
-            sd: DRIFT * (MOST_NOISE * stated / noise.sd()).min(1.0),
-            correlation_s: DRIFT_CORRELATION_S,
+        // A drift of the recorder would hide jumps.
+        let drift = |stated: f64, noise: &Noise| {
+            let sd = DRIFT * (MOST_NOISE * stated / noise.sd()).min(1.0);
+            (!noise.jumps()).then_some(SlowDrift { sd, correlation_s: DRIFT_CORRELATION_S })
         };
         let of_length = with_step(Key::SigmaL, Key::Travel);
         let of_volts = with_step(Key::SigmaV, Key::VFs);

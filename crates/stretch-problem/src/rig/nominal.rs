@@ -119,7 +119,8 @@ pub(super) fn stages(
                 .filter(|&i| kind.holds(owner(&parameters[i])))
                 .collect(),
             noise: (noise.sd() > 0.0).then(|| noise.clone()),
-            recorder_drift: Some(SlowDrift { sd: drift.sd * recorders.sqrt(), ..drift }),
+            recorder_drift: drift
+                .map(|drift| SlowDrift { sd: drift.sd * recorders.sqrt(), ..drift }),
         }
     };
     kinds.iter().map(stage).collect()

@@ -3,12 +3,12 @@
 use crate::support::effects::effect;
 use crate::support::rigs::own_rig;
 use crate::support::rows::{PROBABILITY, with_lost_rows};
-use crate::support::session::session;
+use crate::support::session::{session, session_from};
 use approx::{abs_diff_eq, assert_abs_diff_eq, assert_relative_eq};
 use stretch_data::{RigFile, SessionTrial, Split};
 use stretch_gap::{Diagnosis, Evidence, NoteCode, Options, Run, Simulator, VerdictKind, diagnose};
 use stretch_problem::{Problem, RigSession, RigSetup, RigSimulator};
-use stretch_sim::{Catalogue, EffectSet, Rig, RigParams, SimError, default_rig_text};
+use stretch_sim::{Catalogue, EffectSet, Rig, RigParams, SimError, Start, default_rig_text};
 use testkit::tolerance::{FLOW_FOUND, GAP_NULL, LAG_FOUND, POLE_FOUND_S, TRAINED_AGAIN, TURNED};
 
 /// The stock rig with trials.
@@ -87,6 +87,22 @@ fn a_slow_amplifier_is_named_and_measured_whatever_the_number_of_threads() {
         serde_json::to_string(&Diagnosis { runtime_s: 0.0, ..d.clone() }).expect("JSON")
     };
     assert_eq!(text(&one), text(&two));
+}
+
+/// A memory of 25 s is longer than the pauses. Whether a rig settled before the first trial, before every trial, or
+/// before none, is estimated.
+#[test]
+fn a_long_memory_is_named_wherever_the_trials_begin() {
+    let effects = effect("muscle_creep", &[("c", 0.2), ("tau", 25.0)]);
+    let carried = |_| Start::Carried { rest_s: 14.0 };
+    let first = |trial| if trial == 0 { Start::Settled } else { Start::Carried { rest_s: 14.0 } };
+    for start in [carried, first, |_| Start::Settled] {
+        let trials = session_from(start, &own_rig(), &effects, true, 11);
+        let found = run(trials, &[], &shallow());
+        assert_eq!(found.verdict(), VerdictKind::Effect, "{}", found.sentence);
+        assert_eq!(found.named(), ["muscle_creep"]);
+        assert!(found.candidates[0].closed > 0.95, "{}", found.sentence);
+    }
 }
 
 #[test]

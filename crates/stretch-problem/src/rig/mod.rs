@@ -108,7 +108,7 @@ impl RigSimulator {
             Some(_) => vec![RigStage::Pneumatics, RigStage::Muscle, RigStage::Sensing],
             None => vec![RigStage::Actuation, RigStage::Sensing],
         };
-        let (parameters, tuned) = parameters(&rig, &stage_kinds);
+        let (parameters, tuned) = parameters(&rig, &stage_kinds, columns.trials.len());
         let stages = stages(&stage_kinds, &tuned, &noises);
         let [strain, volts] = extents(&rig.params, &inputs, &columns);
         let place = |effect: &'static Effect| {

@@ -25,9 +25,9 @@ pub(super) enum TunedParameter {
     /// How far ahead of its row every second switch of the commands acts: the even switches (0) or
     /// the odd switches (1).
     CommandLead(usize),
-    /// The initial hysteresis state of a stage, between the state after a motion from the other end of the stroke and a
-    /// settled state.
-    InitialState(RigStage),
+    /// The initial state of a stage's memories, between the state after the motion before and a settled state: at the
+    /// first trial (0) or at all later trials (1).
+    InitialState(RigStage, usize),
 }
 
 /// The parameters of a diagnosis, and what each sets: the rig's parameters with a tolerance in the
@@ -36,6 +36,7 @@ pub(super) enum TunedParameter {
 pub(super) fn parameters(
     rig: &Rig,
     kinds: &[RigStage],
+    trials: usize,
 ) -> (Vec<ParameterSpec>, Vec<TunedParameter>) {
     let parameter = |key: Key| {
         let (info, nominal) = (key.info(), rig.params[key]);
@@ -64,29 +65,32 @@ pub(super) fn parameters(
         .filter(|(parameter, _)| parameter.sd > 0.0)
         .chain([(start, TunedParameter::StartPressure)])
         .chain([0, 1].map(|which| (timing::at_rows(which), TunedParameter::CommandLead(which))))
-        .chain(kinds.iter().filter_map(initial_state))
+        .chain(kinds.iter().flat_map(|kind| initial_states(kind, trials)))
         .unzip()
 }
 
 /// Standard deviation, around 0, of the prior of the settled share in the initial state. A rig that had settled before
-/// the session (share 1) is plausible.
+/// the session or before every trial (share 1) is plausible.
 const INITIAL_STATE: f64 = 0.4;
 
-/// The initial hysteresis state of a stage: 0 as if the rig had come from the other end of the
-/// stroke, 1 as if it had settled where the session begins. The chamber has no such parameter,
-/// because its pressure is measured.
-fn initial_state(kind: &RigStage) -> Option<(ParameterSpec, TunedParameter)> {
-    let name = match kind {
-        RigStage::Pneumatics | RigStage::Reference => return None,
-        RigStage::Sensing => "initial_gauge",
-        RigStage::Muscle | RigStage::Actuation => "initial_muscle",
+/// The initial state of a stage's memories: 0 as after the motion before, 1 as if the rig had settled where the trial
+/// begins. The motion before the first trial came from the other end of the stroke. The chamber has no such
+/// parameters, because its pressure is measured.
+fn initial_states(kind: &RigStage, trials: usize) -> Vec<(ParameterSpec, TunedParameter)> {
+    let names = match kind {
+        RigStage::Pneumatics | RigStage::Reference => return Vec::new(),
+        RigStage::Sensing => ["initial_gauge", "initial_gauge_later"],
+        RigStage::Muscle | RigStage::Actuation => ["initial_muscle", "initial_muscle_later"],
     };
-    let spec = ParameterSpec {
-        least: 0.0,
-        is_evidence: false,
-        ..ParameterSpec::new(name, "1", 0.0).within(INITIAL_STATE)
+    let one = |(which, name): (usize, &str)| {
+        let spec = ParameterSpec {
+            least: 0.0,
+            is_evidence: false,
+            ..ParameterSpec::new(name, "1", 0.0).within(INITIAL_STATE)
+        };
+        (spec, TunedParameter::InitialState(*kind, which))
     };
-    Some((spec, TunedParameter::InitialState(*kind)))
+    names.into_iter().enumerate().take(trials).map(one).collect()
 }
 
 /// Stages with their channels, the parameters that act in them, and their noise.
@@ -106,7 +110,7 @@ pub(super) fn stages(
         // The pressure at a trial's start and the timing of commands belong to the chamber.
         let owner = |parameter: &TunedParameter| match parameter {
             TunedParameter::Rig(key) => key.info().stage,
-            TunedParameter::InitialState(stage) => *stage,
+            TunedParameter::InitialState(stage, _) => *stage,
             TunedParameter::StartPressure | TunedParameter::CommandLead(_) => RigStage::Pneumatics,
         };
         // The slow noise of a measured input reaches the output as well.
@@ -134,10 +138,10 @@ pub(super) struct TunedRig {
     pub(super) offset: f64,
     /// How far ahead of their rows commands act, samples.
     pub(super) leads: Leads,
-    /// Share of the settled state in the initial state of the muscle, 0 to 1.
-    pub(super) initial_muscle: f64,
-    /// Share of the settled state in the initial state of the gauge, 0 to 1.
-    pub(super) initial_gauge: f64,
+    /// Share of the settled state in the initial state of the muscle at the first and at later trials, 0 to 1.
+    pub(super) initial_muscle: [f64; 2],
+    /// The same of the gauge.
+    pub(super) initial_gauge: [f64; 2],
 }
 
 impl TunedRig {
@@ -146,8 +150,8 @@ impl TunedRig {
             params: *base,
             offset: 0.0,
             leads: [0.0; 2],
-            initial_muscle: 0.0,
-            initial_gauge: 0.0,
+            initial_muscle: [0.0; 2],
+            initial_gauge: [0.0; 2],
         };
         for (parameter, value) in parameters.iter().zip(&model.parameters) {
             let share = value.clamp(0.0, 1.0);
@@ -155,8 +159,10 @@ impl TunedRig {
                 TunedParameter::Rig(key) => out.params[*key] = *value,
                 TunedParameter::StartPressure => out.offset = *value,
                 TunedParameter::CommandLead(which) => out.leads[*which] = *value,
-                TunedParameter::InitialState(RigStage::Sensing) => out.initial_gauge = share,
-                TunedParameter::InitialState(_) => out.initial_muscle = share,
+                TunedParameter::InitialState(RigStage::Sensing, at) => {
+                    out.initial_gauge[*at] = share
+                }
+                TunedParameter::InitialState(_, at) => out.initial_muscle[*at] = share,
             }
         }
         out

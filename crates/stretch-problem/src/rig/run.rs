@@ -37,8 +37,8 @@ pub(super) struct Setting<'a> {
     /// Step of integration of stages that commands drive, s.
     pub(super) step_s: f64,
     pub(super) grid: Grid,
-    /// Share of the settled state in the initial state of the stage, 0 to 1.
-    pub(super) initial_share: f64,
+    /// Share of the settled state in the initial state of the stage at the first and at later trials, 0 to 1.
+    pub(super) initial_shares: [f64; 2],
     pub(super) input_noise: Option<u64>,
     /// Input of the stage that replaces the measured one, all trials concatenated.
     pub(super) given: Option<&'a [f64]>,
@@ -55,7 +55,7 @@ pub(super) fn simulate(
     let kind = rig.stage_kinds[run.stage];
     let tuned = TunedRig::of(&rig.base, &rig.tuned, run.model);
     let is_sensor = kind == RigStage::Sensing;
-    let initial_share = if is_sensor { tuned.initial_gauge } else { tuned.initial_muscle };
+    let initial_shares = if is_sensor { tuned.initial_gauge } else { tuned.initial_muscle };
     let acting = rig.bench.acting(run.model)?;
     let dt_s = rig.bench.about.spec().dt_s;
     let step_s = run.step * STEP_S;
@@ -74,7 +74,7 @@ pub(super) fn simulate(
         effects: acting.inside.clone(),
         step_s,
         grid,
-        initial_share,
+        initial_shares,
         input_noise: run.input_noise,
         given,
         kind,
@@ -92,8 +92,8 @@ pub(super) fn simulate(
 enum At {
     /// Two samples before the session, at the other end of the stroke.
     Before,
-    /// The first sample of the session.
-    First,
+    /// The first sample of a trial.
+    First(usize),
     /// A trial.
     Trial(usize),
 }
@@ -101,8 +101,8 @@ enum At {
 impl Setting<'_> {
     /// The start of a trial in the state that the trial before left, after the pause between the two.
     pub(super) fn start(&self, trial: usize) -> Start {
-        if trial == 0 && self.initial_share > 0.0 {
-            // The memory already holds the pause before the first trial.
+        if self.initial_share(trial) > 0.0 {
+            // The memory already holds the pause before the trial.
             return Start::Carried { rest_s: 0.0 };
         }
         self.after_pause(trial)
@@ -122,51 +122,49 @@ impl Setting<'_> {
         Start::Carried { rest_s: (rest_s - 1.0).max(0.0) }
     }
 
-    /// Sets the memory that a stage has of the motion before the session.
+    /// Sets the memory that a stage has of the motion before a trial.
     ///
     /// As a rule a muscle that is vented at the session's start was filled before, so play and creep
-    /// begin from the filled side. A rig that had settled (just switched on, or simulated) remembers no
+    /// begin from the filled side, and later trials begin in the state that the trial before left. A
+    /// rig that had settled before every trial (which waited for long, or was simulated) remembers no
     /// such motion. The initial state lies between the two. The share is a parameter of the recording:
     ///
     /// ```text
     /// cells = moved + share (settled - moved)
     /// ```
     ///
-    /// The function moves a memory that was left at the other end of the stroke towards the memory of a stage that
-    /// settled where the session begins. `begin` runs a stage with a memory at the session's first sample, so that the
-    /// first trial follows without a pause.
+    /// The function moves a memory of the motion before the trial towards the memory of a stage that
+    /// settled where the trial begins. `begin` runs a stage with a memory at the trial's first sample, so that the
+    /// trial follows without a pause.
     fn set_initial_state(
         &self,
-        share: f64,
+        trial: usize,
         memory: &mut Memory,
         mut settled: Memory,
         mut begin: impl FnMut(&mut Memory, Start) -> Result<(), ProblemError>,
     ) -> Result<(), ProblemError> {
+        let share = self.initial_share(trial);
         if share > 0.0 {
-            begin(memory, self.after_pause(0))?;
+            begin(memory, self.after_pause(trial))?;
             begin(&mut settled, Start::Settled)?;
             memory.move_towards(&settled, share);
         }
         Ok(())
     }
 
-    /// The reference, which follows the muscle, after lengths from `before` the session and in its initial state.
+    fn initial_share(&self, trial: usize) -> f64 {
+        self.initial_shares[usize::from(trial > 0)]
+    }
+
+    /// The reference, which follows the muscle, after lengths from `before` the session.
     pub(super) fn reference(
         &self,
         effects: &EffectSet,
         before: &[f64],
-        first: &[f64],
     ) -> Result<ReferenceSensor, ProblemError> {
         let mut shown = self.shown(effects)?;
         let ReferenceSensor { stage, memory, .. } = &mut shown;
-        let (mut filled, mut begun) = (vec![0.0; before.len()], vec![0.0; first.len()]);
-        stage.run(memory, Start::Settled, before, &mut filled)?;
-        self.set_initial_state(
-            self.tuned.initial_muscle,
-            memory,
-            stage.memory(),
-            |memory, start| Ok(stage.run(memory, start, first, &mut begun)?),
-        )?;
+        stage.run(memory, Start::Settled, before, &mut vec![0.0; before.len()])?;
         Ok(shown)
     }
 
@@ -270,7 +268,7 @@ impl Setting<'_> {
             |memory, start, at, own| {
                 let pressure = match at {
                     At::Before => vec![before; own.len()],
-                    At::First => vec![pressure(0).first().copied().unwrap_or(before)],
+                    At::First(trial) => vec![pressure(trial).first().copied().unwrap_or(before)],
                     At::Trial(trial) => pressure(trial),
                 };
                 Ok(stage.run(memory, start, &pressure, own)?)
@@ -283,7 +281,6 @@ impl Setting<'_> {
         let before = self.before_kpa();
         if !stage.is_coupled() {
             let pressure = self.chamber_kpa(&stage, count)?;
-            let first = pressure.first().and_then(|p| p.first()).copied().unwrap_or(before);
             return self.lengths(
                 count,
                 out,
@@ -291,7 +288,7 @@ impl Setting<'_> {
                 |memory, start, at, own| {
                     let held = match at {
                         At::Before => vec![before; stage.grid().nodes(own.len())],
-                        At::First => vec![first],
+                        At::First(trial) => pressure[trial][..1].to_vec(),
                         At::Trial(trial) => {
                             return Ok(stage.run_length(memory, start, &pressure[trial], own)?);
                         }
@@ -308,7 +305,7 @@ impl Setting<'_> {
                 let shut = || Cow::Owned(vec![0.0; own.len()]);
                 let ([inlet, outlet], initial) = match at {
                     At::Before => ([shut(), shut()], before),
-                    At::First => ([shut(), shut()], self.initial_kpa(0)),
+                    At::First(trial) => ([shut(), shut()], self.initial_kpa(trial)),
                     At::Trial(trial) => (self.openings(trial), self.initial_kpa(trial)),
                 };
                 let openings = Openings { inlet: &inlet, outlet: &outlet };
@@ -328,13 +325,13 @@ impl Setting<'_> {
     ) -> Result<(), ProblemError> {
         let (mut memory, mut filled, mut begun) = (fresh(), [0.0; 2], [0.0]);
         run(&mut memory, Start::Settled, At::Before, &mut filled)?;
-        self.set_initial_state(self.initial_share, &mut memory, fresh(), |memory, start| {
-            run(memory, start, At::First, &mut begun)
-        })?;
-        let mut shown = self.reference(&self.effects, &filled, &begun)?;
+        let mut shown = self.reference(&self.effects, &filled)?;
         self.each(count, out, |trial, own| {
+            self.set_initial_state(trial, &mut memory, fresh(), |memory, start| {
+                run(memory, start, At::First(trial), &mut begun)
+            })?;
             run(&mut memory, self.start(trial), At::Trial(trial), own)?;
-            shown.run(self.start(trial), own)
+            shown.run(self, trial, own)
         })
     }
 
@@ -357,7 +354,8 @@ impl Setting<'_> {
             false => Arc::default(),
         };
         // An effect that counts from the start of the session allows no motion before that start.
-        if !self.effects.iter().any(|e| e.effect().counts_session()) {
+        let counts = self.effects.iter().any(|e| e.effect().counts_session());
+        if !counts {
             let (before, kpa) = (self.before_mm(), self.before_kpa());
             let nodes = self.grid.nodes(2);
             let mut volts = [0.0; 2];
@@ -368,19 +366,6 @@ impl Setting<'_> {
                 &vec![before; nodes],
                 &vec![kpa; nodes],
                 &mut volts,
-            )?;
-            let mut length = [self.length(0).first().copied().unwrap_or(before)];
-            shown.undo(&mut length);
-            let first = self.pressure(0).and_then(|pressure| pressure.first().copied());
-            let (pressure, mut volts) = ([first.unwrap_or_else(|| self.initial_kpa(0))], [0.0]);
-            self.set_initial_state(
-                self.initial_share,
-                &mut memory,
-                stage.memory(),
-                |memory, start| {
-                    let start_s = self.rig.bench.about.spec().trials[0].start_s;
-                    Ok(stage.run(memory, start, start_s, &length, &pressure, &mut volts)?)
-                },
             )?;
         }
         let dimmed = self.dimmed(count)?;
@@ -398,7 +383,16 @@ impl Setting<'_> {
             let start_s = self.rig.bench.about.spec().trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
             let stage = dimmed.get(trial).and_then(Option::as_ref).unwrap_or(&stage);
-            stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
+            if counts {
+                let start = self.after_pause(trial);
+                stage.run(&mut memory, start, start_s, &length, &pressure, own)?;
+            } else {
+                let first = [&length[..1], pressure.get(..1).unwrap_or(&[])];
+                self.set_initial_state(trial, &mut memory, stage.memory(), |memory, start| {
+                    Ok(stage.run(memory, start, start_s, first[0], first[1], &mut [0.0])?)
+                })?;
+                stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
+            }
             acting.follow(self.rig.bench.record(trial), own);
             Ok(())
         })
@@ -449,13 +443,23 @@ impl ReferenceSensor {
         Ok(Self { stage, memory, acts, work: Vec::new() })
     }
 
-    pub(super) fn run(&mut self, start: Start, length: &mut [f64]) -> Result<(), ProblemError> {
-        if self.acts {
-            self.work.clear();
-            self.work.extend_from_slice(length);
-            self.stage.run(&mut self.memory, start, &self.work, length)?;
+    /// Replaces the lengths of a trial by those that the sensor shows.
+    pub(super) fn run(
+        &mut self,
+        setting: &Setting<'_>,
+        trial: usize,
+        length: &mut [f64],
+    ) -> Result<(), ProblemError> {
+        if !self.acts {
+            return Ok(());
         }
-        Ok(())
+        let Self { stage, memory, work, .. } = self;
+        work.clear();
+        work.extend_from_slice(length);
+        setting.set_initial_state(trial, memory, stage.memory(), |memory, start| {
+            Ok(stage.run(memory, start, &work[..1], &mut [0.0])?)
+        })?;
+        Ok(stage.run(memory, setting.start(trial), work, length)?)
     }
 
     fn undo(&self, length: &mut [f64]) {

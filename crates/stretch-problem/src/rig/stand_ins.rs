@@ -47,11 +47,12 @@ impl Setting<'_> {
             return Ok(None);
         }
         let mut free = self.free_length(count)?.to_vec();
-        let first = free.first().and_then(|trial| trial.get(..1)).unwrap_or(&[]);
-        let mut shown = self.reference(&alone, &[self.before_mm(); 2], first)?;
+        let mut shown = self.reference(&alone, &[self.before_mm(); 2])?;
+        let initial_shares = self.tuned.initial_muscle;
+        let setting = Setting { effects: alone, grid: self.grid.clone(), initial_shares, ..*self };
         for (trial, own) in free.iter_mut().enumerate() {
             let before = own.clone();
-            shown.run(self.start(trial), own)?;
+            shown.run(&setting, trial, own)?;
             own.iter_mut().zip(before).for_each(|(shown, free)| *shown = free - *shown);
         }
         Ok(Some(free))
@@ -66,10 +67,10 @@ impl Setting<'_> {
         } else {
             effects.grid(&self.tuned.params, self.rig.bench.about.spec().dt_s, self.step_s)?
         };
-        let initial_share = self.tuned.initial_muscle;
-        let without = Setting { effects, grid, initial_share, ..*self };
+        let initial_shares = self.tuned.initial_muscle;
+        let without = Setting { effects, grid, initial_shares, ..*self };
         let stages = [RigStage::Pneumatics, RigStage::Muscle, RigStage::Reference];
-        let others = self.begun(count).chain([initial_share]);
+        let others = self.begun(count).chain(initial_shares);
         let key = causes(&stages, &without.tuned.params, &without.effects, &without.grid, others);
         self.kept((Kept::Lengths, key), count, |all| match has_pressure {
             true => without.muscle(count, all),

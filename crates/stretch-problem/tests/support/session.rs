@@ -31,8 +31,20 @@ fn openings(trial: usize, noise: &mut Noise) -> (Vec<f64>, Vec<f64>) {
     (inlet, outlet)
 }
 
-/// A session of four trials; the last one is a test trial.
+/// A session of four trials, each of which begins in the state that the trial before left; the last one is a test
+/// trial.
 pub(crate) fn session(
+    params: &RigParams,
+    effects: &EffectSet,
+    pressure: bool,
+    seed: u64,
+) -> Vec<SessionTrial> {
+    session_from(|_| Start::Carried { rest_s: 14.0 }, params, effects, pressure, seed)
+}
+
+/// The same, with the state in which each trial begins.
+pub(crate) fn session_from(
+    start: fn(usize) -> Start,
     params: &RigParams,
     effects: &EffectSet,
     pressure: bool,
@@ -49,8 +61,7 @@ pub(crate) fn session(
             let [mut p, mut l, mut v] = [vec![0.0; n], vec![0.0; n], vec![0.0; n]];
             let recorded = Recorded { pressure_kpa: &mut p, length_mm: &mut l, bridge_v: &mut v };
             let valves = Openings { inlet: &inlet, outlet: &outlet };
-            let start = Start::Carried { rest_s: 14.0 };
-            chain.run(&mut memory, start, start_s, valves, 0.1, recorded).expect("a trial");
+            chain.run(&mut memory, start(trial), start_s, valves, 0.1, recorded).expect("a trial");
             p.iter_mut().for_each(|x| *x += 1.2 * noise.gauss());
             l.iter_mut().for_each(|x| *x += 0.05 * noise.gauss());
             v.iter_mut().for_each(|x| *x += 0.002 * noise.gauss());

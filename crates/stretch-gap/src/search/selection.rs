@@ -229,14 +229,38 @@ impl<'a> Search<'a> {
         let untried = self.problem.simulator().effects().len() - best.effects.len();
         progress(&format!("trying effects, round {round}: {untried}"));
         let looked = self.look(best)?;
-        let Looked { ground, screened } = &*looked;
         let kept = if best.effects.is_empty() { KEPT } else { KEPT_LATER };
-        let list = self.shortlist(best, screened, kept);
+        let list = self.shortlist(best, &looked.screened, kept);
+        if let Some(next) = self.first_accepted(best, &looked, &list, progress)? {
+            return Ok(Some(next));
+        }
+        if !self.sets.is_bent(best, 0..best.misfits.len()) {
+            return Ok(None);
+        }
+        // Parameters at the ends of their tolerances may have absorbed an effect, which then has
+        // nothing left to explain.
+        let mut straight = best.clone();
+        straight.model.parameters.clone_from(&self.problem.shipped.parameters);
+        let Some(looked) = if_possible(self.look(&straight))? else { return Ok(None) };
+        let mut others = self.shortlist(best, &looked.screened, kept);
+        others.retain(|other| list.iter().all(|l| l.effect != other.effect));
+        self.first_accepted(best, &looked, &others, progress)
+    }
+
+    /// Fits the extensions of a set by screened effects. Returns the one with the highest score
+    /// that meets the acceptance criteria.
+    fn first_accepted(
+        &mut self,
+        best: &Hypothesis,
+        looked: &Looked,
+        list: &[Screened],
+        progress: &dyn Fn(&str),
+    ) -> Result<Option<Hypothesis>, GapError> {
         if list.is_empty() {
             return Ok(None);
         }
-        progress(&format!("fitting effects, round {round}: {}", list.len()));
-        let found = self.sets.extend_all(best, ground, &list, best.score)?;
+        progress(&format!("fitting effects, round {}: {}", best.effects.len() + 1, list.len()));
+        let found = self.sets.extend_all(best, &looked.ground, list, best.score)?;
         if found.is_empty() {
             return Ok(None);
         }

@@ -307,7 +307,8 @@ impl<'a> Sets<'a> {
     /// compensated for an effect before it was added, and then keep the effect at wrong values.
     pub(crate) fn straightened(&mut self, mut set: Hypothesis) -> Result<Hypothesis, GapError> {
         for effect in set.effects.clone() {
-            let straight = match self.is_bent(&set, effect) {
+            let touches = self.problem.simulator().effects()[effect].touches.iter().copied();
+            let straight = match self.is_bent(&set, touches) {
                 true => unless_lost(self.begun_as_shipped(&set, effect))?.flatten(),
                 false => None,
             };
@@ -319,12 +320,15 @@ impl<'a> Sets<'a> {
         Ok(set)
     }
 
-    /// Whether parameters of an effect's stages are at the ends of their tolerances, the gap
-    /// exceeds [`LEFT`], and runs are left in the budget.
-    fn is_bent(&self, set: &Hypothesis, effect: usize) -> bool {
+    /// Whether parameters of some stages are at the ends of their tolerances, the gap exceeds
+    /// [`LEFT`], and runs are left in the budget.
+    pub(crate) fn is_bent(
+        &self,
+        set: &Hypothesis,
+        stages: impl IntoIterator<Item = usize>,
+    ) -> bool {
         let simulator = self.problem.simulator();
-        let stages = simulator.effects()[effect].touches.iter();
-        let mut own = stages.flat_map(|stage| &simulator.stages()[*stage].parameters);
+        let mut own = stages.into_iter().flat_map(|stage| &simulator.stages()[stage].parameters);
         let is_at_end = |p: &usize| simulator.parameters()[*p].is_at_end(set.model.parameters[*p]);
         own.any(is_at_end) && self.problem.gap(set) > LEFT && !self.problem.is_spent()
     }

@@ -23,7 +23,7 @@ pub enum CalibrateError {
         /// The constant value.
         value: f64,
     },
-    /// Trials, options or a converter that do not allow what was asked. The text says what to do.
+    /// The trials, the options or the converter do not permit the requested operation. The text gives advice.
     #[error("{0}")]
     Refused(String),
     /// The data do not determine a fit.
@@ -111,7 +111,7 @@ impl CalibrateError {
     }
 }
 
-/// Describes a fault that follows from the unit of the signal. Any other fault keeps its own text.
+/// Returns the message for an invalid number. If the cause is the unit of the signal, the message says so.
 fn in_words(error: &DesignError) -> String {
     match error {
         DesignError::OutOfRange { field: "step of observer.curve", value } => format!(
@@ -122,7 +122,7 @@ fn in_words(error: &DesignError) -> String {
     }
 }
 
-/// Describes why numbers do not fit integers, without the names of those numbers.
+/// Returns the message for a calibration that does not fit integers. Names of internal numbers are left out.
 fn without_internal_names(error: &ReceptorError) -> String {
     match error {
         ReceptorError::Calibration(
@@ -135,11 +135,12 @@ fn without_internal_names(error: &ReceptorError) -> String {
     }
 }
 
-/// Largest relative difference between the median sample interval of a log and the sample interval of the calibration
-/// for which both count as equal.
+/// Two sample intervals count as equal up to this relative difference: the median interval of a log and the interval of
+/// the calibration.
 pub(crate) const PACE_TOLERANCE: f64 = 0.2;
 
-/// Returns the advice to fit a line, except for the models of `stretch-sleeve`, which replace `--model`.
+/// Returns the end of an error message, with the advice to fit a line. It is empty for the models of `stretch-sleeve`,
+/// because `--model` does not select them.
 fn or_linear(model: &str) -> &'static str {
     if matches!(model, "array" | "prior") { "" } else { ", or fit --model linear" }
 }

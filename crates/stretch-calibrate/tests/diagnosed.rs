@@ -142,8 +142,7 @@ fn without_a_diagnosis_it_is_no_candidate() {
     assert!(error.contains("wander_0") && error.contains("pressure_kpa"), "{error}");
 }
 
-/// A non-linearity becomes part of the curve, and a drift becomes part of the baseline. Neither has a parameter of its
-/// own.
+/// The curve takes up a non-linearity, and the baseline takes up a drift. Neither effect adds a parameter.
 #[test]
 fn causes_without_numbers_are_calibrated() {
     for name in ["gauge_nonlinearity", "thermal_drift", "mains_hum"] {

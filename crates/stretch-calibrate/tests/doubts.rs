@@ -161,7 +161,8 @@ fn trials_of_one_gauge_are_not_doubted() {
         spoil(&mut trials[1]);
         assert_eq!(notes(&trials), Vec::<String>::new());
     }
-    // A robot repeats a motion to a thousandth; another quantity is at its lower limit most of the time.
+    // Neither is a mistake: a robot that repeats its motion to within a thousandth, and a quantity that is at its lower
+    // limit most of the time.
     let mut trials: Vec<Trial> = (0..3).map(trial).collect();
     trials.push(Trial { name: "repeated.csv".into(), ..trials[1].clone() });
     change(&mut trials[3], SIGNAL, |v| v + 1e-4 * (1e4 * v).sin());

@@ -74,7 +74,7 @@ fn an_offset_of_the_signal_changes_nothing() {
             assert!((rmse / least - 1.0).abs() < 1e-3, "{model} {offset}: {least} {rmse}");
             let furthest = estimates.iter().zip(&found).map(|(a, b)| (a - b).abs());
             let furthest = furthest.filter(|d| !d.is_nan()).fold(0.0, f64::max);
-            // The limit is the effect of the last digit of a reading of 4200, with a range of 1, on a rate over a
+            // The limit allows for the rounding of readings of about 4200, relative to a range of 1, in a rate over a
             // hundredth of a second.
             assert!(model == "observer" || furthest < 1e-6, "{model} {offset}: {furthest:e}");
             // An `f32` has 24 bits, of which 4200 takes 12.
@@ -130,8 +130,8 @@ fn a_table_gives_a_line_or_a_curve_of_the_right_degree() {
             .map(|k| degree_of(&weights(bent, k.wrapping_mul(2_654_435_769)), 0.1))
             .collect();
         assert!(found.iter().all(|&found| found >= degree), "{degree}: {found:?}");
-        // The criterion of one standard error accepts a higher degree in one table of six: 10 of 60, with a standard
-        // deviation of 2.9, of which two are allowed.
+        // By chance, the criterion of one standard error accepts a higher degree for one table in six: for 10 of 60,
+        // with a standard deviation of 2.9. Two standard deviations more are allowed.
         let higher = found.iter().filter(|&&found| found > degree).count();
         assert!(higher <= 16, "{degree}: {found:?}");
     }
@@ -164,7 +164,7 @@ fn a_line_answers_at_once_at_any_rate_and_on_one_row() {
             let reading = reading.as_ref().unwrap();
             let held = (0.5 * k as f64).min(5.0);
             approx::assert_abs_diff_eq!(reading.estimate, held, epsilon = 1e-9);
-            // Ten samples of 0.1 s determine a rate of half a newton a sample.
+            // From the tenth sample on the rate is known: the load rises by half a newton in each sample of 0.1 s.
             let is_known = (k >= 10).then(|| (reading.rate - 5.0).abs() < 1e-6);
             assert_eq!(is_known.unwrap_or(true), k >= 10 || reading.rate.is_nan(), "{reading:?}");
         }

@@ -207,7 +207,7 @@ fn models_with_memory_start_again_after_a_long_gap() {
     }
 }
 
-/// A baseline is followed at the end at which the sensor rests, whichever it is.
+/// A baseline is followed at the end of the range at which the sensor rests, be it the low or the high end.
 #[test]
 fn the_baseline_is_followed_at_the_end_where_the_sensor_rests() {
     let moves = |phase: f64| move |t: f64| (1.1 * t + phase).sin().max(0.0).powi(2);

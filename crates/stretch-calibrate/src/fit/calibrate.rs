@@ -32,9 +32,9 @@ pub struct Calibrated {
 
 /// Fits a calibration to logged trials.
 ///
-/// The ranges of signal and target over all trials are stored, and those of the rates over each branch. [`Trial::even`]
-/// resamples trials to an even time grid: a few lost samples are interpolated, and long gaps cut a trial.
-/// [`Calibrated::notes`] lists the changes.
+/// The calibration stores the ranges of signal and target over all trials, and the range of the rate for each branch.
+/// [`Trial::even`] resamples trials to an even time grid: a few lost samples are interpolated, and long gaps cut a
+/// trial. [`Calibrated::notes`] lists the changes.
 ///
 /// # Errors
 /// [`CalibrateError`], which names the trial and column, or the branch and term.
@@ -63,7 +63,8 @@ pub fn calibrate(trials: &[Trial], options: &Options) -> Result<Calibrated, Cali
     calibrate_with(trials, options, None).map(|(calibrated, _)| calibrated)
 }
 
-/// Fits a calibration. If an earlier `choice` is given, it is kept. Also returns the choice that was made.
+/// Fits a calibration. If `choice` is given, the fit uses it and makes no choices itself. Also returns the choices that
+/// were used.
 pub(crate) fn calibrate_with(
     trials: &[Trial],
     options: &Options,
@@ -95,8 +96,8 @@ pub(crate) fn calibrate_with(
     Ok((Calibrated { calibration, fits, doubts, notes }, made))
 }
 
-/// Choices within a model with memory, such as its time constants. They are kept when the model is fitted again to
-/// parts of the same data.
+/// What the fit of a model with memory chooses, such as time constants. A fit to a part of the same data uses the same
+/// choices again.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {
     History(HistoryChoice),

@@ -12,7 +12,7 @@ const BEND: f64 = 1e-3;
 /// Smallest rise of a curve over its whole length, as a share of the signal's range.
 pub(crate) const LEAST_RISE: f64 = 1e-3;
 
-/// Returns the range of the values without the outermost 0.02 % at each end; `None` if the range is empty.
+/// Returns the range of the values without the lowest and the highest 0.02 % of them; `None` if the range is empty.
 pub(crate) fn inner(mut all: Vec<f64>) -> Option<Interval> {
     let edge = all.len() / 5000;
     let last = all.len().checked_sub(1 + edge)?;

@@ -41,8 +41,8 @@ impl Moved {
         if self.parameter.is_log() { 0.01 } else { 0.002 * self.range() }
     }
 
-    /// Returns the expected distance of the coordinate from its initial value. It is smaller for a parameter of an
-    /// effect's form than for other parameters.
+    /// Returns the expected distance of the coordinate from its initial value. It is smaller for parameters of the
+    /// effect's form (such as the width of a knee) than for the other parameters.
     fn likely(&self) -> f64 {
         match (self.parameter.is_log(), self.parameter.is_form()) {
             (true, true) => 0.3,

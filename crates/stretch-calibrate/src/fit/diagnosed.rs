@@ -33,7 +33,7 @@ const STEADY_S: [f64; 3] = [0.15, 0.5, 3.0];
 /// Acceptance criterion: a more complex alternative is kept if its error is below this share of the simpler one's.
 const ACCEPTED: f64 = 0.97;
 
-/// Choices of a fit. A fit with earlier choices starts from them.
+/// What a fit chooses. If a fit is given such choices, it starts from them.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DiagnosedChoice {
     at: Vec<f64>,
@@ -84,8 +84,8 @@ pub(crate) fn diagnosed(
     Ok(((Model::Diagnosed(map), vec![report], vec![note]), Choice::Diagnosed(choice)))
 }
 
-/// Fits the forward model so that the errors of the signal are small, then so that the errors of the target are small.
-/// The second fit divides each error by the slope of the curve. Keeps the fit with which the live receptor has the
+/// Fits the forward model twice: first it minimises the errors of the signal, then the errors of the target, which are
+/// the errors of the signal divided by the slope of the curve. Keeps the fit with which the live receptor has the
 /// smaller error.
 fn refined(
     prepared: &Prepared,
@@ -206,7 +206,8 @@ impl<'a> Record<'a> {
                 each.map(|(i, &y)| live.advance(&mut now, y, pressure(i))).collect();
             memory = Some(now);
             for (i, &signal) in piece.signal.iter().enumerate().skip(SETTLE) {
-                // Outside the ends the last drive is held, so that the number of pairs does not depend on the skew.
+                // Before the first drive and after the last one, the nearest drive is used. Therefore the number of
+                // pairs does not depend on the skew.
                 let place = (i as f64 - late).clamp(0.0, (drives.len() - 1) as f64);
                 let below = (place as usize).min(drives.len() - 2);
                 let share = place - below as f64;
@@ -214,7 +215,8 @@ impl<'a> Record<'a> {
                 pairs.push((drive, signal));
             }
         }
-        // A stream is assumed to start in the mean state of trials that follow other trials.
+        // The state at the start of a stream is the mean over those trials that follow another trial, because the state
+        // before the first trial is unknown.
         let mean = |is_upper: bool, otherwise: f64| {
             let own = states.iter().filter(|(y, _)| (*y > 0.5) == is_upper);
             let (n, sum) = own.fold((0.0, 0.0), |(n, sum), (_, share)| (n + 1.0, sum + share));
@@ -271,7 +273,8 @@ impl<'a> Record<'a> {
             normal = nalgebra::DMatrix::from_fn(count, count, |i, j| dot(&columns[i], &columns[j]));
             let mut slope =
                 nalgebra::DVector::from_fn(count, |i, _| dot(&columns[i], &seen.residuals));
-            // The value from the diagnosis has the weight of one observation; a block of samples is one observation.
+            // The value from the diagnosis counts as one observation. A block of samples also counts as one, because
+            // the errors within it are correlated.
             let level = self.mean(&seen) * self.block();
             let cost = |seen: &Seen, defects: &Defects| {
                 let stray: f64 = defects.strayed(&begin).iter().map(|(d, w)| w * d * d).sum();
@@ -359,7 +362,7 @@ impl<'a> Record<'a> {
         }
     }
 
-    /// Returns the map with whose filter the live receptor has the least error.
+    /// Tries several settings of the filter, and returns the map with which the live receptor has the smallest error.
     fn tuned(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
         use rayon::prelude::*;
         let maps: Result<Vec<DiagnosedMap>, CalibrateError> = STEADY_S
@@ -370,7 +373,8 @@ impl<'a> Record<'a> {
         best.ok_or(CalibrateError::NoTrials)
     }
 
-    /// Returns the map with the statistics of its estimates, which the live receptor computes.
+    /// Runs the live receptor with these settings of the filter, and returns the map with the statistics of the
+    /// estimates.
     fn judged(
         &self,
         forward: &Forward,
@@ -388,14 +392,14 @@ impl<'a> Record<'a> {
         Ok(DiagnosedMap { fit: tally.summary(), spread, ..map })
     }
 
-    /// Returns the map without the statistics of its estimates.
+    /// Returns the map of a forward fit, without the statistics of the estimates.
     fn map(&self, forward: &Forward) -> Result<DiagnosedMap, CalibrateError> {
         let Seen { simulated, curve, domain, .. } = &forward.seen;
         let sign = self.prepared.polarity.sign();
         let curve: Vec<f64> = curve.iter().map(|v| sign * v).collect();
         let estimate_domain = self.targets.unwrap_or(*domain);
         let map = forward.defects.map();
-        // The fitted curve gives the resting signal without noise.
+        // The resting level comes from the fitted curve, because a measured level contains noise.
         let live = LiveDefects::<f64>::new(&map, self.period_s);
         let mut still = live.begin(estimate_domain.min, 0.0);
         let at_rest = live.advance(&mut still, estimate_domain.min, 0.0);

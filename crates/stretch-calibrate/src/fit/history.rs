@@ -178,7 +178,7 @@ impl TermRows {
     }
 }
 
-/// Choices of a fit. A fit with earlier choices makes no further ones.
+/// What a fit chooses. If a fit is given such choices, it uses them and chooses nothing itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct HistoryChoice {
     pub(crate) design: StateDesign,
@@ -196,7 +196,8 @@ struct Trained {
     cross_validated: f64,
 }
 
-/// Fits the model. If `rest` is true, the baseline is tracked. An earlier `choice`, made on more data, is kept.
+/// Fits the model. If `rest` is true, the baseline is tracked. If `choice` is given (from a fit to more data), the fit
+/// uses it.
 pub(crate) fn history(
     prepared: &Prepared,
     rest: bool,
@@ -283,7 +284,8 @@ fn better(best: &mut Option<Trained>, found: Result<Trained, CalibrateError>) {
     }
 }
 
-/// Computes the pieces of all series. A fit does not store them, because they would be by far its largest part.
+/// Computes the pieces of all series. A fit does not store them, because they need far more memory than all its other
+/// data.
 fn pieces(prepared: &Prepared, design: StateDesign, rest: Option<RestTracker>) -> Vec<Piece> {
     let period_s = prepared.sample_rate.period_s();
     let mut pieces = Vec::new();

@@ -36,7 +36,8 @@ const NUDGE: f64 = 0.01;
 /// its column. It is so small that it has no effect if any data determine the parameter.
 const BOUNDS_RIDGE: f64 = 1e-9;
 
-/// Fits an observer. If `rest` is true, the baseline is tracked. An earlier `choice`, made on more data, is kept.
+/// Fits an observer. If `rest` is true, the baseline is tracked. If `choice` is given (from a fit to more data), the
+/// fit uses it.
 pub(crate) fn observer(
     prepared: &Prepared,
     rest: bool,
@@ -71,8 +72,8 @@ pub(crate) fn observer(
     Ok(((Model::Observer(map), vec![report], vec![note]), Choice::Observer(choice)))
 }
 
-/// States the noise of the signal, and the standard deviation of the change of speed in a second. The speed is a random
-/// walk with the spectral density `agility`, 1/s^3.
+/// Returns a sentence with the noise of the signal and with the standard deviation of the change of speed in a second.
+/// The model of the speed is a random walk with the spectral density `agility`, 1/s^3.
 pub(super) fn in_words(prepared: &Prepared, noise: f64, agility: f64) -> String {
     let noise = format!("{noise:.4} {}", unit_of(&prepared.options.signal));
     format!(
@@ -154,8 +155,8 @@ fn second_relaxation(
     Ok(best.1)
 }
 
-/// Returns a forward model, and the map whose agility (density of the rate's random walk) gives the live receptor the
-/// least error.
+/// Fits a forward model, tries several agilities (spectral densities of the rate's random walk), and returns the model
+/// and the map with which the live receptor has the smallest error.
 fn tuned(
     prepared: &Prepared,
     pieces: &[Piece],
@@ -282,7 +283,7 @@ fn judged(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, Calibra
     let (amplitudes, weights) = rest.split_at(taus.len());
     let targets = prepared.series.iter().flat_map(|s| s.target.iter());
     let estimate_domain = extent(targets.map(|&t| prepared.target_range.normalise(t)));
-    // The fitted curve gives the resting signal without noise.
+    // The resting level comes from the fitted curve, because a measured level contains noise.
     let level = Place::new(estimate_domain.min, forward.drive).on(&curve);
     let rest =
         forward.choice.rest.map(|rest| RestTracker { level, catch_up_s: LIVE_CATCH_UP_S, ..rest });

@@ -19,13 +19,13 @@ use super::{
 };
 
 const RADII: [f64; 3] = [0.03, 0.1, 0.3];
-/// Smallest slope of the drive with respect to the target while plays (hysteresis elements) stand still, as a share of
-/// the slope without plays.
+/// Smallest slope of the drive with respect to the target while outputs of plays (hysteresis elements) are constant, as
+/// a share of the slope without plays.
 const LEAST_ANSWER: f64 = 0.1;
 /// Window of the quadratic filter that smooths the reference, in samples.
 const SMOOTH: usize = 7;
 
-/// Choices of a fit. A fit with earlier choices makes no further ones.
+/// What a fit chooses. If a fit is given such choices, it uses them and chooses nothing itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ObserverChoice {
     pub(crate) taus: [Option<f64>; 2],
@@ -151,8 +151,9 @@ pub(crate) struct Forward {
 }
 
 impl Forward {
-    /// Returns whether the drive rises with the target, whichever plays stand still. A drive that falls cannot be
-    /// inverted. After a reversal all plays stand still, and the widest ones do so for the longest time.
+    /// Returns whether the drive rises with the target in every state of the plays. Otherwise the model cannot be
+    /// inverted. After a reversal, the outputs of all plays are constant at first, and that of the widest play for the
+    /// longest time.
     pub(crate) fn answers(&self) -> bool {
         let plays = self.choice.radii().len();
         let (instant, weights) = self.dynamics[1..].split_at(self.dynamics.len() - 1 - plays);
@@ -171,16 +172,16 @@ impl Forward {
     }
 }
 
-/// Time in which the live baseline of a forward model follows a signal below rest, s. It is short because the resting
-/// level of a forward model is exact.
+/// Time constant with which the live baseline of a forward model follows a signal below the resting level, s. It can be
+/// short because a forward model computes the resting level without noise.
 pub(crate) const LIVE_CATCH_UP_S: f64 = 0.02;
-/// Time in which a baseline follows a signal below rest, s.
+/// Time constant with which a baseline follows a signal below the resting level in a fit, s.
 const CATCH_UP_S: f64 = 0.5;
 /// Leaks (rates at which the baseline rises by itself) that are tried, as shares of the signal's range per second.
 const LEAKS: [f64; 4] = [0.0, 0.0003, 0.001, 0.003];
 /// Margin below the resting level for the noise of a signal at rest, in standard deviations.
 const MARGIN: f64 = 1.0;
-/// A trial that begins in this lowest share of the range is assumed to begin at rest.
+/// A trial that begins in the lowest part of the range, of this share, is assumed to begin at rest.
 const LOWEST_QUARTER: f64 = 0.25;
 /// Number of samples at a trial's start whose median is its starting value.
 const FIRST: usize = 50;

@@ -13,20 +13,19 @@ use super::{
     evaluate::{MethodErrors, TrialErrors},
 };
 
-/// A fit whose error is more than this share of the reference's standard deviation explains nothing, because the mean
-/// of the reference alone has an error that is at most about a twentieth larger. (The same margin of a twentieth
-/// decides between models.)
+/// A fit explains nothing if its error exceeds this share of the reference's standard deviation: a constant estimate,
+/// the mean of the reference, would then have an error that is at most about 5 % larger. (The same margin decides
+/// between models.)
 const LEFT: f64 = 0.95;
 
-/// Returns why a fit should not be used: without any signal, the mean of the reference would have about the same error.
+/// Returns why a fit should not be used: its error is about that of a constant estimate, the mean of the reference.
 ///
 /// ```text
 /// sqrt(1 - R^2) > 0.95,  R^2 < 0.0975
 /// ```
 ///
-/// Returns `None` for a fit that explains more. Typical causes of a fit that explains nothing are an error of the
-/// reference itself (a placeholder that the recorder writes for a missing value), a sensor that is not connected, or a
-/// column with another quantity.
+/// Returns `None` for any other fit. Typical causes are errors of the reference (a placeholder that the recorder writes
+/// for a missing value), a sensor that is not connected, or a column with another quantity.
 pub fn explains_nothing(fits: &[FitReport]) -> Option<String> {
     let worst = fits.iter().min_by(|a, b| a.r_squared.total_cmp(&b.r_squared))?;
     let left = (1.0 - worst.r_squared).max(0.0).sqrt();
@@ -53,9 +52,9 @@ pub fn explains_little(fits: &[FitReport]) -> Option<String> {
     })
 }
 
-/// Returns a doubt for a log in which most samples lie outside the calibrated domain.
+/// Returns a doubt for a log if more than half of its samples lie outside the calibrated domain.
 ///
-/// Most means more than half. The estimates of such a log are mostly those at the ends of the domain.
+/// Most estimates of such a log are computed from inputs that are clamped to the ends of the domain.
 pub fn outside_range(clamped: u64, samples: u64) -> Option<Doubt> {
     let text = (2 * clamped > samples).then(|| {
         format!(
@@ -67,8 +66,8 @@ pub fn outside_range(clamped: u64, samples: u64) -> Option<Doubt> {
     text.map(|text| Doubt::new("outside_range", text))
 }
 
-/// Returns a doubt for estimates that are missing after the first one of their trial: their samples do not count in the
-/// errors. The warm-up before that is no doubt.
+/// Returns a doubt if estimates are missing after the first estimate of a trial, because the errors do not include
+/// these samples. Samples before the first estimate belong to the warm-up and cause no doubt.
 pub(super) fn without_estimate<'a>(trials: impl Iterator<Item = &'a [f64]>) -> Option<Doubt> {
     let (mut missing, mut all) = (0, 0);
     for estimates in trials {
@@ -83,7 +82,7 @@ pub(super) fn without_estimate<'a>(trials: impl Iterator<Item = &'a [f64]>) -> O
     Some(Doubt::new("without_estimate", text))
 }
 
-/// Returns a doubt for estimates with a larger error than the mean of the reference.
+/// Returns a doubt if the estimates have a larger error than a constant estimate, the mean of the reference.
 pub(super) fn worse_than_the_mean(errors: &MethodErrors) -> Option<Doubt> {
     let text = (errors.r_squared < 0.0).then(|| {
         let r_squared = errors.r_squared;
@@ -107,13 +106,13 @@ fn with_unit(x: f64, unit: &str) -> String {
     format!("{} {unit}", in_digits(x, 4)).trim_end().to_owned()
 }
 
-/// Largest ratio of the RMSE without the mean error to the RMSE of the fit at which the calibration
-/// still holds apart from a shift.
+/// Largest ratio of the RMSE without the mean error to the RMSE of the fit at which a shift is the only fault of the
+/// estimates.
 const ALIKE: f64 = 1.25;
 
-/// Returns a doubt for estimates of a trial that are shifted: the mean error is more than a twentieth of the range, or
-/// more than a hundredth and five times the error of the fit, and either it is most of the error, or the calibration is
-/// as accurate without it as in its fit.
+/// Returns a doubt if the estimates of a trial are shifted. Two conditions must hold. First, the mean error exceeds 5 %
+/// of the range, or both 1 % of the range and five times the error of the fit. Second, the mean error is most of the
+/// error, or without it the error is about that of the fit:
 ///
 /// ```text
 /// |bias| > min(0.05 range, max(0.01 range, 5 fit))  and
@@ -146,8 +145,8 @@ pub(super) fn off_throughout(
     text.map(|text| Doubt::new("constant_error", text))
 }
 
-/// Returns a doubt for estimates of a trial that come a constant time after or before the reference, if most of the error
-/// comes from that time:
+/// Returns a doubt if the estimates of a trial are later or earlier than the reference by a constant time, and this
+/// time causes most of the error:
 ///
 /// ```text
 /// rmse > 1.25 fit  and  mean of (estimate(t + lag) - reference(t))^2 <= rmse^2 / 2
@@ -187,8 +186,8 @@ pub(super) fn delayed(
 /// Factors between units of a reference: decimal prefixes, and degrees in a radian.
 const FACTORS: [f64; 4] = [10.0, 100.0, 1000.0, DEGREES_IN_A_RADIAN];
 
-/// Returns a doubt for a trial whose reference runs against the estimates, or is in another unit: `line` is the line
-/// through estimates and reference, whose slope is about 1 otherwise.
+/// Returns a doubt if the reference of a trial falls while the estimates rise, or if it is in another unit. `line` is
+/// the regression line of the reference over the estimates. Without such a mistake its slope is about 1.
 pub(super) fn other_reference(line: &Line, reference: &str) -> Option<Doubt> {
     let doubt = |text| Some(Doubt::new("other_reference", text));
     if !line.is_clear() {
@@ -224,10 +223,9 @@ pub(super) fn beside_a_constant(errors: &MethodErrors) -> Option<Doubt> {
     text.map(|text| Doubt::new("constant_reference", text))
 }
 
-/// Returns a doubt that lists the trials to which a calibration was fitted; `None` if there are none. `columns` are
-/// the signals and the reference. A calibration holds the names of its first trials and the checksums of their samples.
-/// A trial is therefore recognised under another name, and a trial that has only the name of a fitted trial is reported
-/// as such.
+/// Returns a doubt that lists the trials to which a calibration was fitted; `None` if there are none. `columns` are the
+/// signals and the reference. The calibration stores names and checksums of its first trials. A trial with the checksum
+/// of a fitted trial is recognised even if it was renamed. If only the names are equal, the doubt says so.
 pub fn fitted_trials(provenance: &Provenance, columns: &[&str], trials: &[Trial]) -> Option<Doubt> {
     let is_known = |trial: &Trial| {
         let checksum = trial.checksum(columns);

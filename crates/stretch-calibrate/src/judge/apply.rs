@@ -22,16 +22,16 @@ pub fn cadence(sample_rate: SampleRate) -> Result<Runner<Cadence>, CalibrateErro
     Ok(Runner::new(Cadence::new(sample_rate, 0.2)?))
 }
 
-/// Largest number of missing samples of one gap that are given to a receptor. Every memory has
-/// settled before.
+/// Largest number of missing samples of one gap that are passed to a receptor. After so many, the memory of every model
+/// has settled.
 pub const MOST_MISSING: u32 = 20_000;
 
 /// Longest gap that a model with memory bridges, in seconds. In tests on the simulated rig, prediction across a gap of
 /// 0.3 s is as good as a new start, and after 2 s its errors are seven times as large.
 const LONGEST_GAP_S: f64 = 0.5;
 
-/// Time after a longer gap in which a model with memory settles and gives no estimate, in seconds. On the simulated rig
-/// the errors after this time are those without a gap.
+/// Time after a longer gap during which a model with memory gives no estimate, because its states have not settled, in
+/// seconds. On the simulated rig, the errors after this time equal those of a stream without a gap.
 const SETTLING_S: f64 = 0.3;
 
 /// A receptor that checks the time stamps. Missing samples are passed on as missing, and a time stamp that runs
@@ -61,13 +61,13 @@ pub struct LiveReceptor {
     memory: <Receptor<f64> as Design>::Memory,
     cadence: Runner<Cadence>,
     faults: Faults,
-    /// For a model that needs no rate: a rate estimator whose warm-up decides from which sample on the reading has a
-    /// rate (NaN before).
+    /// For a model that needs no rate: a rate estimator. The rate of a reading is NaN until this estimator has warmed
+    /// up.
     rate: Option<Runner<RateFilter<f64>>>,
     /// Number of consecutive missing samples.
     missing: u32,
-    /// For a model with memory: the number of samples of the longest gap that is bridged, and the number of samples in
-    /// which the model settles after a longer one.
+    /// For a model with memory: the length of the longest gap that is bridged, and the time that the model needs to
+    /// settle after a longer gap, both in samples.
     gap: Option<(u32, u32)>,
     /// Number of samples until the model has settled after a long gap.
     settling: u32,
@@ -275,8 +275,8 @@ impl Stage<f64> for Logged {
     }
 }
 
-/// Returns the calibration with the ranges of one trial: the signal and the rate are normalised by the ranges of the
-/// trial, and nothing is clamped (paper section 2.5).
+/// Returns a calibration that normalises signal and rate by the ranges of one trial instead of its own, and clamps
+/// nothing (paper section 2.5).
 ///
 /// This function allows a comparison with the paper. The ranges of a trial are known only at its end, so such a
 /// calibration cannot run live.

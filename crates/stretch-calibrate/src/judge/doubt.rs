@@ -37,15 +37,15 @@ impl Doubt {
         Self { code, text }
     }
 
-    /// Whether this doubt explains every other one: the signal is in another unit, or the sensor is not connected.
+    /// Whether this doubt is the cause of all others: the signal is in another unit, or the sensor is not connected.
     pub fn explains_others(&self) -> bool {
         matches!(self.code, "other_unit" | "constant_signal")
     }
 
-    /// Returns doubts about a method of an evaluation, by its place in it: trials whose reference is in another unit or
-    /// reversed, trials whose estimates are shifted or delayed, and errors that say nothing. Doubts about a trial name it if there
-    /// are several. `fit_rmse` is the RMSE of the method's fit, in the unit of the reference, and `reference` the name of
-    /// that column.
+    /// Returns doubts about one method of an evaluation: trials whose reference is in another unit or reversed, trials
+    /// whose estimates are shifted or delayed, and errors that have no meaning. A doubt about one of several trials
+    /// names the trial. `method` is the index of the method in the evaluation, `fit_rmse` the RMSE of its fit in the
+    /// unit of the reference, and `reference` the name of the reference column.
     pub fn of_method(
         evaluation: &Evaluation,
         method: usize,
@@ -113,9 +113,10 @@ pub struct Seen {
     pub samples: u64,
     /// Samples without an estimate.
     pub withheld: u64,
-    /// Samples with a clamped signal or rate of change: the signal is beyond the ends of the model's curve.
+    /// Samples whose signal or rate of change was clamped to the ends of the model's curve.
     pub limited: u64,
-    /// Those of them outside the calibrated domain: see [`MethodErrors::clamped`](crate::MethodErrors::clamped).
+    /// Clamped samples that are also outside the calibrated domain: see
+    /// [`MethodErrors::clamped`](crate::MethodErrors::clamped).
     pub clamped: u64,
     range: Range<f64>,
     reach: Reach,
@@ -158,10 +159,10 @@ impl Seen {
     }
 }
 
-/// Whether a signal, or its rate of change, is outside the range of a calibration's own trials.
+/// Whether a signal or its rate of change is outside the range of the fitted trials.
 ///
-/// A model limits the signal to the ends of its fitted curve, which lie inside this range because the trials have noise.
-/// The samples of the fit are therefore inside, although some of them are limited.
+/// A model clamps the signal to the ends of its fitted curve. Because trials have noise, these ends lie inside the
+/// range of the fitted trials. Therefore some samples of the fit are clamped although they are inside the range.
 pub(super) fn is_outside(range: &Range<f64>, signal: f64, reading: &Reading) -> bool {
     match reading.domain {
         Domain::Inside | Domain::EstimateClamped => false,
@@ -230,11 +231,11 @@ pub fn evaluation_doubts(
         let said = Doubt::of_method(evaluation, method, fit_rmse, spec.reference.as_str());
         let outside = outside(&reach, errors.clamped, errors.samples);
         match outside {
-            // Estimates from the ends of the range say nothing about the errors.
+            // Most estimates were computed from clamped inputs, so doubts about their errors would be misleading.
             Some(cause) if cause.explains_others() || cause.code == "other_sensor" => {
                 all.push(cause.of(name));
             }
-            // A shift comes first, because it also puts samples outside the range.
+            // Doubts about a shift come first, because a shift also moves samples out of the range.
             outside => all.extend(said.into_iter().chain(outside).map(|doubt| doubt.of(name))),
         }
     }
@@ -262,8 +263,9 @@ impl Pace {
     }
 
     /// Counts the time of a sample. Returns a doubt, at most once, if the usual interval differs from that of the
-    /// calibration. In a slower stream, samples count as missing, so the rates are right, but there are gaps. In a
-    /// faster stream the rates are wrong. A rate that is a thousand times too low shows times in milliseconds.
+    /// calibration. If the stream is slower, the samples in between count as missing: the rates are right, but there
+    /// are gaps. If the stream is faster, the rates are wrong. If its rate is a thousand times too low, the times are
+    /// probably in milliseconds.
     fn take(&mut self, time_s: f64) -> Option<Doubt> {
         if self.is_told || !time_s.is_finite() || self.stamps_s.last() == Some(&time_s) {
             return None;
@@ -274,7 +276,7 @@ impl Pace {
         }
         self.is_told = true;
         let mut stamps_s = std::mem::take(&mut self.stamps_s);
-        // Rows that go back in time are left out here, as they are when a file is read.
+        // Rows that go back in time are left out, because a reader of files leaves them out as well.
         for at in out_of_order(&stamps_s).into_iter().rev() {
             stamps_s.remove(at);
         }

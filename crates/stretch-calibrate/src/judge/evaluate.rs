@@ -265,8 +265,8 @@ fn nothing_estimated(trial: &Trial, rate_hz: f64, expected_hz: f64) -> Calibrate
     CalibrateError::Refused(format!("{}: no sample has an estimate; {why}", trial.name))
 }
 
-/// Shifts an angle that wraps, whose turn is unknown, to the turn of the first calibration's estimates. The methods
-/// before the first calibration are shifted with it.
+/// Shifts the reference, an angle that wraps, by whole turns to the estimates of the first calibration. The estimates
+/// of methods without a calibration are shifted by the same amount.
 fn onto_first_turn(reference: &mut [f64], methods: &mut [Estimates], first: usize, turn: f64) {
     let off = reference.iter().zip(&methods[first].values).map(|(x, y)| y - x);
     let known: Vec<f64> = off.filter(|off| off.is_finite()).collect();

@@ -181,9 +181,9 @@ fn without(trials: &[Trial], fold: &Fold, options: &Options) -> Vec<Trial> {
     rest
 }
 
-/// Returns the range of the fitted signal. A left-out sample beyond it is not judged, because a calibration to all data
-/// does not clamp this sample, and a line loses less by the clamp than a curve does. For a table, there is no limit: see
-/// [`beyond_its_ends`].
+/// Returns the range of the fitted signal. Left-out samples beyond this range are not judged. A calibration to all data
+/// would not clamp them, and clamping would favour a line, because it increases the error of a curve more. For a table,
+/// there is no limit: see [`beyond_its_ends`].
 fn fitted_range(fitted: &[Trial], options: &Options) -> Result<Interval, CalibrateError> {
     if options.is_table {
         return Ok(Interval { min: f64::NEG_INFINITY, max: f64::INFINITY });

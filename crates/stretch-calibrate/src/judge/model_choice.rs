@@ -25,8 +25,8 @@ const AS_GOOD: f64 = 1.05;
 /// Greatest acceptable ratio of the cross-validated root mean square error with a tracked baseline to that without. A
 /// tracked baseline reduces the effect of a drift of 5 % in a minute by a quarter.
 const PREMIUM: f64 = 1.05;
-/// Greatest number of rows that candidates evaluated in parallel hold in memory together. Each candidate needs some
-/// 200 bytes a row.
+/// Greatest number of rows in memory, over all candidates that are evaluated in parallel. Each candidate needs some 200
+/// bytes a row.
 const JUDGED_TOGETHER: usize = 1_000_000;
 /// The result of cross-validation for one model.
 #[derive(Debug, Clone, Serialize)]
@@ -128,7 +128,8 @@ pub fn choose_model_watched(
     let judged =
         judged.into_iter().map(|(kind, judged)| (kind, judged.map_err(&mut in_words))).collect();
     choose_among(trials, options, judged).ok_or_else(|| {
-        // A part without samples gives the error that there is no trial, which would mislead a user who named trials.
+        // For a part without samples the error is that there is no trial. It is dropped, because it would mislead a
+        // user who named trials.
         let first = first.filter(|problem| !matches!(problem, CalibrateError::NoTrials));
         first.unwrap_or_else(|| CalibrateError::too_few_to_judge(trials))
     })
@@ -250,7 +251,8 @@ fn is_length(options: &Options) -> bool {
     options.rest_length.is_some() || options.reference.starts_with("length")
 }
 
-/// Returns what the data cannot show. Of `not_judged` samples, the signal lies outside the range of the other `left_out`.
+/// Returns notes on what the data cannot show. `not_judged` is the number of samples that did not count because their
+/// signal lies outside the range of the data that were fitted; `left_out` names the parts, such as `trials`.
 fn notes(
     trials: &[Trial],
     options: &Options,
@@ -313,7 +315,8 @@ const BUDGET: &str = include_str!("../budget.txt");
 /// Returns the number of instructions per sample on a Cortex-M3, which has no floating-point unit and computes in `f32`
 /// from volts. Returns `None` for a model that was not measured.
 ///
-/// The number applies to the largest model that a fit of that name may choose, but to one relaxation in an observer.
+/// It was measured with the largest model that a fit of this name can choose; an observer was measured with a single
+/// relaxation.
 ///
 /// ```
 /// use stretch_calibrate::{ModelKind, m3_instructions, m3_instructions_fixed};
@@ -327,7 +330,7 @@ pub fn m3_instructions(model: ModelKind) -> Option<f64> {
         ModelKind::Linear | ModelKind::Surface(Degree::POLY13) => {
             mean(&format!("{model}-f32-volts"))
         }
-        // A curve of three terms or more costs less than a surface.
+        // Curves were not measured. A curve costs less than a surface if it has three terms or more.
         ModelKind::Curve => None,
         _ => mean(&model.to_string()),
     }

@@ -7,7 +7,7 @@ use crate::prepare::extent;
 
 use super::doubt::Doubt;
 
-/// Powers of ten with which a signal is multiplied to test other units: from nano to giga.
+/// Exponents of the powers of ten by which a signal is multiplied to test other units: from nano to giga.
 const POWERS: std::ops::RangeInclusive<i32> = -9..=9;
 /// Number of powers.
 const COUNT: usize = 19;
@@ -15,7 +15,7 @@ const COUNT: usize = 19;
 /// Distance from the range, as a share of its span, beyond which a sample is far outside.
 const FAR: f64 = 0.5;
 
-/// What to ask about samples of which most are far outside in every unit.
+/// End of the message if most samples are far outside in every unit.
 const OTHER: &str =
     ": is it the calibrated sensor, in the same unit? If so, calibrate on trials with this range";
 
@@ -132,7 +132,8 @@ impl Reach {
 }
 
 impl Reach {
-    /// Returns what to do about samples of which most are `outside` in every unit, but few far outside.
+    /// Returns the end of the message if most samples are outside in every unit, but few of them far outside. `outside`
+    /// is the number of samples outside.
     fn advice(&self, outside: u64) -> String {
         let mean = 100.0 * self.excess / outside as f64;
         let share = |percent: f64| {
@@ -144,9 +145,10 @@ impl Reach {
         )
     }
 
-    /// Returns the power of ten that brings most samples inside, with their number; `None` if there is none. The power
-    /// must belong to a unit, or make the samples about as wide as the range: a shifted signal may come inside by
-    /// chance. If several powers bring them inside, because the range contains zero, it must do both.
+    /// Returns the power of ten that brings most samples inside, with their number; `None` if there is none. A shifted
+    /// signal may come inside by chance. Therefore the power must belong to a unit, or the multiplied samples must span
+    /// about the width of the range. If several powers bring most samples inside, because the range contains zero, both
+    /// conditions must hold.
     fn best_power(&self) -> Option<(i32, u64)> {
         let brings = POWERS.zip(self.inside).filter(|(_, inside)| 2 * inside > self.samples);
         let brings: Vec<(i32, u64)> = brings.collect();

@@ -22,7 +22,7 @@ const STANDS: usize = 5;
 const MOVES_ON: f64 = 0.1;
 /// Rates below this limit, Hz, are probably due to time stamps in milliseconds.
 const SLOW_HZ: f64 = 0.5;
-/// Smallest number of samples of a fit without a doubt, and at which a low rate is attributed to a wrong unit of time.
+/// A fit with fewer samples causes a doubt. From this number on, a low rate is attributed to a wrong unit of time.
 const TELLING: usize = 50;
 
 /// Greatest number of trials with which each trial is compared. If there are more, they are chosen evenly.
@@ -30,9 +30,9 @@ const OTHERS: usize = 32;
 /// To find copies, trials are sorted by their mean reference, and each is compared with this many neighbours.
 const NEXT: usize = 8;
 
-/// A possible mistake in one trial, as a function and a message. The function takes the line of this trial and the line
-/// of another one. It returns the line of this trial as recorded, and the line that the trial would have without the
-/// mistake.
+/// A possible mistake in one trial: a function and a message. The arguments of the function are the regression lines of
+/// this trial and of another trial. It returns two lines: that of this trial as recorded, and that of this trial
+/// without the mistake.
 type Mistake = (fn(Line, Line) -> [Line; 2], &'static str);
 
 /// Degrees in a radian.
@@ -388,7 +388,8 @@ pub(super) fn doubts(
         .par_iter()
         .map(|own| others().map(|j| (j, own.line.mistake(held[j].line))).collect())
         .collect();
-    // A mistake is reported for the trial that more of the others contradict; of two trials, for the second.
+    // A mistake is reported for the trial that contradicts more of the others. If there are only two trials, it is
+    // reported for the second.
     let rank = |i: usize| (mistakes[i].iter().filter(|(_, says)| says.is_some()).count(), i);
     let copies = copies(&held);
     for (i, own) in held.iter().enumerate() {

@@ -136,7 +136,7 @@ fn by_rate(series: &Series, source: RateSource, dead: DeadBands) -> Vec<Option<B
         RateSource::Voltage => series.signal_rate[i].map(|rate| (rate, dead.signal)),
         RateSource::Strain => series.signal_rate[i].map(|_| (series.target_rate[i], dead.target)),
     };
-    // Before the first movement, the branch is that of this movement.
+    // Samples before the first movement get the branch of that movement.
     let first = (0..series.target.len())
         .filter_map(decide)
         .find(|(rate, dead)| rate.abs() > *dead)

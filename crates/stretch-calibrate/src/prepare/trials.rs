@@ -350,17 +350,17 @@ pub(crate) fn noise_gain(
 /// Index of the trial, and its signal, reference and, if needed, pressure.
 pub(super) type Piece = (usize, [Vec<f64>; 3]);
 
-/// Time over which a reference at rest changes by less than [`STILL`] of its range, s.
+/// A reference is at rest if it changes by less than [`STILL`] within this time, s.
 const STILL_S: f64 = 0.2;
-/// Share of the reference's range.
+/// Largest change of a reference at rest, as a share of its range.
 const STILL: f64 = 0.01;
-/// Share of the reference's range within which a rest is at one of its ends.
+/// A rest is at an end of the range if its distance from this end is less than this share of the range.
 const AT_AN_END: f64 = 0.15;
-/// Smallest duration of the rests from which their end is detected, s.
+/// Smallest total duration of the rests at one end from which the resting end is detected, s.
 const LEAST_REST_S: f64 = 1.0;
 
-/// Whether a reference rests at its greatest value. It does at the end where it rests more than twice as long as at the
-/// other, for a second at least; otherwise where it `usually` does.
+/// Whether a reference rests at its greatest value. The answer is `usually`, unless the reference rests at the other
+/// end for more than a second and more than twice as long.
 fn rests_at_greatest(pieces: &[Piece], rate_hz: f64, usually: bool) -> bool {
     let references = || pieces.iter().map(|(_, [_, reference, _])| reference);
     let seen = extent(references().flatten().copied());

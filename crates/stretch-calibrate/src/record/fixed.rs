@@ -48,16 +48,17 @@ pub struct FixedRecord {
 
 /// Returns a calibration in integers. Its inputs are codes of `adc`, its outputs thousandths of the reference's unit.
 ///
-/// Linear models and surfaces with no term beyond poly13 that depend on the rate become a
-/// [`FixedCalibration`], observers a [`FixedObserver`].
+/// A line, and surfaces that depend on the rate and have only terms of poly13, become a [`FixedCalibration`]. An
+/// observer becomes a [`FixedObserver`].
 ///
 /// # Errors
-/// [`CalibrateError::Refused`] for a converter of more than 16 bits, [`CalibrateError::NoFixedForm`] for any other
-/// model, for a rate estimator for which no type was compiled (an observer needs none), if a step of an estimate
-/// ([`FIXED_STEP`]) exceeds the fit's error, and if the reference in such steps exceeds 32 bits,
-/// [`CalibrateError::OutsideConverter`] as [`converter_reach`], and for an observer whose numbers do not fit because the
-/// converter does not measure its whole range, and
-/// [`CalibrateError::Fixed`] if a number does not fit its format.
+/// - [`CalibrateError::Refused`] for a converter of more than 16 bits.
+/// - [`CalibrateError::NoFixedForm`] for any other model, for a rate estimator whose window was not compiled in (an
+///   observer needs none), if a step of the estimate ([`FIXED_STEP`]) exceeds the error of the fit, or if the reference
+///   in these steps does not fit 32 bits.
+/// - [`CalibrateError::OutsideConverter`] as for [`converter_reach`], and for an observer whose numbers do not fit
+///   because the converter does not measure the whole range.
+/// - [`CalibrateError::Fixed`] if a number does not fit its format for another reason.
 ///
 /// ```
 /// use stretch_calibrate::{fixed_record, parse_adc};
@@ -89,7 +90,8 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
     };
     match &calibration.spec().model {
         Model::Linear(_) | Model::Observer(_) => {}
-        // in integers it would wait for the window of a rate that it does not use
+        // an integer receptor would give no estimate until the window of the rate is full, although a curve needs no
+        // rate
         curve if curve.needs_signal_only() => return none("the curve model"),
         Model::Surfaces { inflation, deflation } => {
             let mut branches = [inflation, deflation].into_iter();
@@ -118,7 +120,7 @@ pub fn fixed_record(calibration: &Calibration, adc: &Adc) -> Result<FixedRecord,
         return Ok(FixedRecord { note, ..rated(calibration, adc)? });
     }
     let fixed = FixedObserver::new(calibration, adc).map_err(|error| match &note {
-        // an observer needs the whole range
+        // the cause is the converter, because an observer needs the whole range
         Some(note) => CalibrateError::OutsideConverter(note.clone()),
         None => CalibrateError::Fixed(error),
     })?;
@@ -154,7 +156,7 @@ pub fn converter_reach(
     let Interval { min, max } = range;
     let AdcSpec { zero_v, full_scale_v, .. } = adc.spec();
     let codes = (max - min) / adc.volts_per_code();
-    // a hundredth of the range is not worth a note
+    // differences of up to a hundredth of the range cause no note
     let beyond = (zero_v - min).max(max - full_scale_v) > 0.01 * (max - min);
     // A converter cannot have given counts that it does not have.
     let is_outside = max < zero_v || full_scale_v < min || (beyond && adc.is_in_counts());

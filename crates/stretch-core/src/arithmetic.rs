@@ -33,14 +33,14 @@ pub fn lag_share(step_s: f64, tau_s: f64) -> f64 {
     -libm::expm1(-step_s / tau_s)
 }
 
-/// Returns three weights: of the lag's state `z`, of the previous input, and of the new input. Their weighted sum is
-/// the new `z`. It is exact for an input that is a straight line over the step.
+/// Returns three weights: of the lag's state `z`, of the previous input, and of the new input. The sum of these three
+/// numbers, each times its weight, is the new `z`. It is exact if the input changes linearly during the step.
 ///
 /// ```text
 /// z_new = w[0] z + w[1] x_before + w[2] x_now,   w[0] = exp(-step_s/tau_s)
 /// ```
 ///
-/// Use them for an input that changes between samples, for which [`lag`] would be half a sample early.
+/// Use these weights if the input changes between samples. [`lag`] would then be early by half a sample.
 ///
 /// ```
 /// use stretch_core::arithmetic::lag_weights;
@@ -53,7 +53,8 @@ pub fn lag_share(step_s: f64, tau_s: f64) -> f64 {
 pub fn lag_weights(step_s: f64, tau_s: f64) -> [f64; 3] {
     let a = step_s / tau_s;
     let gone = lag_share(step_s, tau_s);
-    // mean of the decay over the step; small steps need a series, because the differences below would cancel
+    // mean of the decay over the step; for small steps it is computed by a series, because the difference would lose
+    // digits by cancellation
     let mean = if a < 1e-4 { 1.0 - a * (0.5 - a / 6.0) } else { gone / a };
     [1.0 - gone, mean - (1.0 - gone), 1.0 - mean]
 }
@@ -65,9 +66,9 @@ pub fn lag_weights(step_s: f64, tau_s: f64) -> [f64; 3] {
 /// y = max(x - radius, min(x + radius, y_before))
 /// ```
 ///
-/// It works on floats and integers. It uses only comparisons, one sum and one difference, so every platform gives the
-/// same bits. [`HistoryMap`](crate::HistoryMap) and [`ObserverMap`](crate::ObserverMap) are built from it.
-/// Source: Kuhnen 2003, doi:10.3166/ejc.9.407-418.
+/// The function works on floats and integers. It uses only comparisons, one sum and one difference, so every platform
+/// gives the same bits. [`HistoryMap`](crate::HistoryMap) and [`ObserverMap`](crate::ObserverMap) use it. Source:
+/// Kuhnen 2003, doi:10.3166/ejc.9.407-418.
 ///
 /// ```
 /// use stretch_core::arithmetic::play;

@@ -55,8 +55,8 @@ impl Branch {
 }
 
 impl core::fmt::Display for Branch {
-    /// Writes the direction of the target. [`Target::branch_name`](crate::Target::branch_name) returns that of the
-    /// reference.
+    /// Writes the direction in which the target moves. [`Target::branch_name`](crate::Target::branch_name) returns the
+    /// direction in which the reference moves.
     ///
     /// ```
     /// assert_eq!(stretch_core::Branch::Inflation.to_string(), "target_rises");

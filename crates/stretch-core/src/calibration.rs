@@ -11,7 +11,8 @@ use crate::{
 ///
 /// Schema 1 has no checksum. Schema 2 has the same fields and a checksum, which is checked when the bytes are loaded
 /// (`record::load`, or `stretch_calibrate::read_calibration`). Release 0.1.0 also wrote schema 3, in binary form only,
-/// for calibrations that stored the turning points of movements. These are now files of the crate `stretch-sleeve`.
+/// for calibrations that stored the turning points of movements. The crate `stretch-sleeve` now writes such
+/// calibrations.
 pub const CALIBRATION_SCHEMA: u32 = 2;
 
 /// The estimated quantity (the target), and its relation to the reference, the measured quantity with a unit.
@@ -56,7 +57,7 @@ impl Target {
         }
     }
 
-    /// Returns the change of the reference per change of the target that is normalised by `range`: its span times
+    /// Returns the change of the reference per change of the normalised target: the span of `range` times
     /// [`reference_per_target`](Self::reference_per_target).
     ///
     /// ```
@@ -90,7 +91,7 @@ impl Target {
     }
 }
 
-/// The rate on which the surfaces were fitted. In live use the rate is always that of the signal.
+/// The rate to which the surfaces were fitted. A live estimator always uses the rate of the signal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(rename_all = "snake_case"))]
@@ -208,9 +209,8 @@ pub struct CalibrationSpec {
 pub struct Calibration(CalibrationSpec);
 
 impl Calibration {
-    /// Checks the parts. Every number must be finite and so limited in size that no finite sample gives a
-    /// non-finite reading: numbers with a unit are at most 1e9, divisors at least 1e-9, sample rates 1e-3 to 1e7
-    /// Hz.
+    /// Checks the parts. Every number must be finite and within limits that keep the reading of every finite sample
+    /// finite: numbers with a unit are at most 1e9, divisors at least 1e-9, sample rates 1e-3 to 1e7 Hz.
     ///
     /// The result has [`Schema::CURRENT`], because the schema describes only how the file was written. Schema 1 has
     /// the same fields.
@@ -237,7 +237,8 @@ impl Calibration {
     }
 }
 
-/// Checks the magnitudes of the numbers outside the model, and those of the model after folding (see `folded`).
+/// Checks the magnitudes of all numbers outside the model, and the magnitudes in the model after normalisation is
+/// multiplied into its coefficients (see `folded`).
 fn check_sizes(spec: &CalibrationSpec) -> Result<(), DesignError> {
     let hz = spec.sample_rate_hz.hz();
     DesignError::check("sample_rate_hz", hz, RATES_HZ.contains(&hz))?;

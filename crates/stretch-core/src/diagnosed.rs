@@ -24,8 +24,8 @@ pub struct Crosstalk {
 /// A soft lower bound on the drive u: the output is `floor + (d + sqrt(d^2 + 4 (w ln 2)^2))/2`, with `d = u - floor`
 /// and the width w. An upper bound (ceiling) is the mirror image.
 ///
-/// If the drive equals the bound, the output is inside the bound by `w ln 2`, as for the soft knee `w ln(1 + exp(d/w))`
-/// of `stretch-effects`. This form needs only a square root, whereas `ln` and `exp` would take space on a
+/// At `u = floor` the output exceeds the bound by `w ln 2`, as does the soft knee `w ln(1 + exp(d/w))` of
+/// `stretch-effects`. The form used here needs only a square root, whereas `ln` and `exp` would take space on a
 /// microcontroller.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -61,7 +61,7 @@ pub struct Fading {
 }
 
 /// A response that weakens with use: the drive u becomes `(u - zero)(1 - m x/(n + x)) + zero`, where x is the total
-/// travel of u (the sum of all its movements).
+/// travel of u (the sum of the magnitudes of all its movements).
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
@@ -121,8 +121,9 @@ pub struct DiagnosedMap {
     pub lowpass_s: Option<[f64; 2]>,
     /// Delay of the signal behind the target, s.
     pub skew_s: f64,
-    /// State of the plays if a stream begins at the lower and at the upper end of `estimate_domain`. Between the
-    /// ends the state is interpolated linearly. 1 means that the target came up from far below, -1 from far above.
+    /// Two states of the plays: for a stream that begins at the lower end of `estimate_domain`, and for one that begins
+    /// at the upper end. Between the ends the state is interpolated linearly. 1 means that the target came up from far
+    /// below, -1 that it came down from far above.
     #[cfg_attr(feature = "serde", serde(rename = "wound"))]
     pub initial_hysteresis: [f64; 2],
     /// Signal at evenly spaced drives over `drive_domain`, strictly monotone.
@@ -135,8 +136,8 @@ pub struct DiagnosedMap {
     pub agility: f64,
     /// Time constant with which the predicted rate decays, s.
     pub steady_s: f64,
-    /// Factor by which the filter's own standard deviation is multiplied: the RMS of the fit's errors, each divided by
-    /// that deviation.
+    /// Factor by which the filter's own standard deviation is multiplied. It is the root mean square of the errors in
+    /// the fit, each divided by the filter's standard deviation.
     pub spread: f64,
     /// Range of the normalised targets in the fit.
     pub estimate_domain: Interval,

@@ -31,9 +31,10 @@ pub enum DesignError {
         /// The checksum computed from its bytes.
         computed: u32,
     },
-    /// Bytes that do not begin like a record, such as erased memory, or fewer bytes than a checksum has.
+    /// Bytes that are no binary calibration file: they have another beginning (erased memory, for example), or are
+    /// fewer than the bytes of a checksum.
     NoRecord,
-    /// A record with a valid checksum that holds another type than the requested one.
+    /// A binary calibration file with a valid checksum that holds another type than the requested one.
     OtherRecord,
     /// A calibration file of a schema (format version) that this release does not know.
     Schema {

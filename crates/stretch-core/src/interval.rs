@@ -15,7 +15,7 @@ pub struct Interval {
 }
 
 impl Interval {
-    /// Checks that both ends are finite and in order. The error names `field`.
+    /// Checks that both ends are finite and that the lower end comes first. The error names `field`.
     ///
     /// # Errors
     /// [`DesignError::OutOfRange`] or [`DesignError::EmptyRange`].

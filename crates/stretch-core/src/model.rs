@@ -53,8 +53,8 @@ pub enum Model {
         /// For a falling target.
         deflation: BranchSurface,
     },
-    /// Two surfaces mixed across the dead band, as supported by builds of stretch 0.1.0 before 27 November 2026.
-    /// [`Model::validate`] refuses this model. The variant stays because binary calibration files store the
+    /// Two surfaces that are mixed across the dead band. Builds of stretch 0.1.0 before 27 November 2026 had this
+    /// model. [`Model::validate`] refuses this model. The variant stays because binary calibration files store the
     /// variant's index.
     Blended {
         /// For a rising target.
@@ -111,8 +111,8 @@ impl Model {
         }
     }
 
-    /// Returns whether an estimate depends on samples before the window of the rate: the model has states that follow the
-    /// signal. Two receptors with other states then differ until these have faded.
+    /// Returns whether an estimate depends on samples before the window of the rate, because the model has states that
+    /// follow the signal. Two receptors with different states give different estimates until the states have faded.
     ///
     /// ```
     /// use stretch_core::{FitSummary, Interval, LinearMap, Model};
@@ -125,8 +125,8 @@ impl Model {
         matches!(self, Self::History(_) | Self::Observer(_) | Self::Diagnosed(_))
     }
 
-    /// Returns the root mean square error of the fit in normalised target, the larger one of two branches; infinite for
-    /// a removed kind.
+    /// Returns the root mean square error of the fit in normalised target. With two branches it is the larger of their
+    /// errors; for a model that was removed it is infinite.
     ///
     /// ```
     /// use stretch_core::{FitSummary, Interval, LinearMap, Model};

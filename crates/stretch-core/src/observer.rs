@@ -27,8 +27,8 @@ pub const MAX_KNOTS: usize = 33;
 /// relies on the predicted motion, elsewhere on the signal. `y` is clamped to `estimate_domain`.
 ///
 /// Every number is a property of the gauge or of the motion, with a unit. Source: this project. The filter is an
-/// extended form of that of Kalman 1960, doi:10.1115/1.3662552, with the secant instead of the tangent wherever the
-/// secant is steeper.
+/// extended Kalman filter (Kalman 1960, doi:10.1115/1.3662552) that linearises the curve with a secant instead of the
+/// tangent wherever the secant is steeper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]

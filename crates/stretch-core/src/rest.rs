@@ -7,12 +7,13 @@ use crate::{
 
 /// Parameters of a baseline that follows the resting signal.
 ///
-/// A muscle is never longer than at rest, and a joint cannot be straighter than straight. Therefore the signal has
-/// drifted if it is below its calibrated resting level (or above it, for a signal that falls with the target), and the
+/// A muscle is never longer than at rest, and a joint does not extend beyond its straight position. Therefore a signal
+/// below its calibrated resting level (or above it, if the signal falls with the target) must have drifted, and the
 /// baseline follows it. Let `s` be the signal times the sign of the polarity, `b` the baseline, and `e` the running
 /// average of `s - b - level` over about [`RestTracker::AVERAGE_S`], which suppresses noise. For each sample:
 /// - if `e < 0`: `b += e dt/catch_up_s`;
-/// - otherwise `b += leak dt`, so that drift in the other direction is found at the next rest.
+/// - otherwise `b += leak dt`. The baseline thus rises slowly, and drift in the other direction is corrected at the
+///   next rest.
 ///
 /// The input of the model is `s - b`. If a model predicts how its memory shifts the resting signal, `level` is shifted
 /// by the same amount. [`RestLevel`](crate::RestLevel) implements this per sample. Source: this project. It is a

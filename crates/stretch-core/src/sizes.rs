@@ -1,9 +1,9 @@
 //! Limits on the numbers of a calibration, which ensure that no finite sample gives a non-finite reading.
 //!
 //! A microcontroller computes in `f32`, whose largest value is 3.4e38. Samples are at most 1e18 at up to 1e7 Hz, so a
-//! rate is at most 2e25. Factors of a rate must stay below 1e11, which leaves a margin of 100. Other products must stay
-//! below 1e30. Numbers with a unit are at most 1e9 and divisors at least 1e-9. Calibrations in nanometres and
-//! microvolts are within these limits.
+//! rate is at most 2e25. A coefficient that multiplies a rate must be below 1e11, which leaves a margin of 100. Other
+//! products must be below 1e30. Numbers with a unit are at most 1e9 and divisors at least 1e-9. Calibrations in
+//! nanometres and microvolts are within these limits.
 
 use crate::{DesignError, Interval, Range};
 

@@ -56,7 +56,8 @@ proptest! {
         let h = 1e-5;
         let by_rate = (naive(&surface, rate + h, volts) - naive(&surface, rate - h, volts)) / (2.0 * h);
         let by_volts = (naive(&surface, rate, volts + h) - naive(&surface, rate, volts - h)) / (2.0 * h);
-        // truncation h^2/6 times a third derivative of at most 21 * 3 * 60; rounding 1e-16/h
+        // error of the difference quotient: truncation h^2/6 times a third derivative of at most 21 * 3 * 60, and
+        // rounding 1e-16/h
         let tolerance = 1e-10 / 6.0 * 21.0 * 3.0 * 60.0 + 63.0 * 1e-15 / h;
         assert_abs_diff_eq!(surface.d_rate(rate, volts), by_rate, epsilon = tolerance);
         assert_abs_diff_eq!(surface.d_volts(rate, volts), by_volts, epsilon = tolerance);

@@ -4,8 +4,7 @@ use proptest::{prelude::*, strategy::ValueTree, test_runner::TestRunner};
 use serde_json::{Value, json};
 use stretch_core::{Calibration, CalibrationSpec, Degree, DesignError, Model, Surface};
 
-/// Returns a valid calibration in JSON, whose model is one with surfaces. Tests spoil a field of
-/// it.
+/// Returns a valid calibration with surfaces, in JSON. The tests make one of its fields invalid.
 fn record() -> Value {
     let mut runner = TestRunner::deterministic();
     loop {

@@ -54,8 +54,8 @@ impl Scale {
     fn new(field: &'static str, factor: f64) -> Result<Self, DesignError> {
         let (_, exponent) = libm::frexp(factor);
         let shift = 30 - exponent;
-        // allows factors from 2^-33 to below 2^29: with smaller ones every product rounds to 0, with larger ones nearly
-        // none fits
+        // accepts factors from 2^-33 to below 2^29: with a smaller factor every product rounds to 0, with a larger
+        // factor nearly every product exceeds 32 bits
         DesignError::check(field, factor, factor > 0.0 && (1..=62).contains(&shift))?;
         let shift = shift as u32;
         Ok(Self { mantissa: from_f64(field, factor, shift)?, shift })

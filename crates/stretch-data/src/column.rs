@@ -40,9 +40,9 @@ impl Quantity {
 
     /// Returns the quantity that a column measures.
     ///
-    /// If `stated`, the unit given explicitly, is not empty, only that unit counts. Otherwise the
-    /// unit is the last part of the column's name. If that part is no unit, or a single letter that
-    /// could also be an index of a motor, a word in the name decides.
+    /// If `stated`, a unit that the user gives, is not empty, it determines the quantity. Otherwise the unit in the
+    /// last part of the column's name does. If that part is no unit, or a single letter that could also be the index of
+    /// a motor, a word in the name determines the quantity.
     ///
     /// ```
     /// use stretch_data::Quantity;
@@ -66,8 +66,8 @@ impl Quantity {
         }
     }
 
-    /// Returns the quantity that a unit measures, in the spelling of columns or of people, or
-    /// `None` for an unknown unit.
+    /// Returns the quantity that a unit measures; `None` for an unknown unit. The unit can have the spelling of column
+    /// names or a usual spelling.
     fn of_unit(unit: &str) -> Option<Self> {
         let mut factors = unit.split('/').flat_map(|part| part.split("_per_"));
         let known = |text: &str| {
@@ -84,8 +84,8 @@ impl Quantity {
     }
 }
 
-/// One row of the unit table: the spelling in column names, the display form, the quantity, the
-/// case-sensitive spellings by people, and the lower-case names.
+/// One row of the unit table: the spelling in column names, the display form, the quantity, the usual spellings
+/// (case-sensitive), and the names in lower case.
 type Unit =
     (&'static str, &'static str, Quantity, &'static [&'static str], &'static [&'static str]);
 
@@ -226,14 +226,14 @@ fn resolved<'a>(column: &str, unit: &'a str) -> &'a str {
     if unit == "nm" && is_length() { "nanom" } else { unit }
 }
 
-/// Whether the column's name does not indicate any quantity other than an angle or one that
-/// `is_one` accepts.
+/// Whether the column can be an angle or a quantity that `is_one` accepts: its name and unit indicate no other
+/// quantity.
 pub(crate) fn measures_nothing_else(column: &str, is_one: impl Fn(Quantity) -> bool) -> bool {
     let is_unknown = unit(column).and_then(Quantity::of_unit).is_none_or(|unit| unit == Angle);
     Quantity::of(column, "").is_none_or(|q| q == Angle || is_unknown && is_one(q))
 }
 
-/// Returns the table row of a simple unit (without `/` or `_per_`) in a spelling used by people.
+/// Returns the table row of a simple unit (without `/` or `_per_`) from one of its usual spellings.
 fn row_of(text: &str) -> Option<&'static Unit> {
     let low = text.to_lowercase();
     let exact = UNITS.iter().find(|row| row.3.contains(&text));
@@ -286,8 +286,8 @@ pub fn unit_of(column: &str) -> String {
     factors.join("/")
 }
 
-/// Returns the display form of a simple unit (without `/` or `_per_`), given in the spelling of
-/// columns or of people. An unknown unit is returned unchanged.
+/// Returns the display form of a simple unit (without `/` or `_per_`) from its spelling in column names or a usual
+/// spelling. An unknown unit is returned unchanged.
 ///
 /// ```
 /// assert_eq!(stretch_data::written_unit("kpa"), "kPa");
@@ -297,8 +297,8 @@ pub fn written_unit(spelt: &str) -> &str {
     UNITS.iter().find(|row| row.0 == spelt).or_else(|| row_of(spelt)).map_or(spelt, |row| row.1)
 }
 
-/// Returns the spelling in column names of a simple unit (without `/` or `_per_`), given in a
-/// spelling used by people. Returns `None` if the text is no unit.
+/// Returns the spelling in column names of a simple unit (without `/` or `_per_`) from one of its usual spellings.
+/// Returns `None` if the text is no unit.
 ///
 /// ```
 /// use stretch_data::spelt_unit;

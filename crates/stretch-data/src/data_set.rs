@@ -250,7 +250,7 @@ impl DataSet {
     }
 }
 
-/// Whether a relative path cannot lead out of the folder in which it starts.
+/// Whether a relative path stays within the folder in which it starts.
 fn stands_in_folder(path: &str) -> bool {
     let mut parts = Path::new(path).components().peekable();
     parts.peek().is_some() && parts.all(|part| matches!(part, Component::Normal(_)))

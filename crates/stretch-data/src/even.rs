@@ -4,8 +4,8 @@ use std::{borrow::Cow, ops::Range};
 
 use crate::{DataError, Trial};
 
-/// Largest number of consecutive lost samples that is bridged, as in a live receptor. A longer gap
-/// splits the trial.
+/// Largest number of consecutive lost samples that is bridged, the same as in a live receptor. A longer gap splits the
+/// trial.
 const MOST_BRIDGED: usize = 3;
 /// Largest deviation of a sample from its grid point, in periods, at which the sample is taken
 /// unchanged.
@@ -17,8 +17,8 @@ const CLOCKS: f64 = 1e-3;
 const OTHER_RATE: f64 = 0.05;
 /// If there are more gaps than this, one note summarizes all of them.
 const TOLD: usize = 3;
-/// Change of a valve opening that counts as a switch. A smaller change may be noise; a gap at such a change is bridged
-/// well by the value on either side.
+/// Smallest change of a valve opening that counts as a switch. A smaller change may be noise, and then the value on
+/// either side bridges a gap well enough.
 const SWITCH: f64 = 0.05;
 /// Channels whose values a device holds until the next sample: commands of the valves.
 const HELD: [&str; 2] = ["inlet", "outlet"];
@@ -30,8 +30,8 @@ pub struct EvenSpec {
     pub rate_hz: f64,
     /// Parts between gaps, and whole trials, with fewer samples than this are left out.
     pub shortest: usize,
-    /// Longest gap that is bridged, s, if the commands are the same on both sides of it. In that
-    /// case, gaps of up to three samples are always bridged.
+    /// Longest gap that is bridged, s, if the commands are equal before and after it. With equal commands, gaps of up
+    /// to three samples are always bridged.
     pub bridged_s: f64,
     /// Whether up to three missing samples are bridged even if a valve switched during the gap, at
     /// an unknown time.
@@ -114,7 +114,7 @@ pub struct Even {
     pub rows: Rows,
     /// For each column that was unwrapped, the size of a turn in the column's unit.
     pub turns: Vec<Option<f64>>,
-    /// Sentences about time without samples, at which the trial is parted.
+    /// Sentences about the gaps at which the trial is split.
     pub gaps: Vec<String>,
     /// Notes: parts left out, uneven time stamps, wrapped angles. Empty if nothing had to be
     /// changed.

@@ -33,7 +33,7 @@ pub struct RigFile {
 pub struct Parameter {
     /// Nominal value, in SI units unless the name states another unit.
     pub value: f64,
-    /// One standard deviation, relative to the value. Without any tolerance the parameter is exact.
+    /// One standard deviation, relative to the value. A parameter without any tolerance is known exactly.
     #[serde(default, deserialize_with = "from_zero", skip_serializing_if = "Option::is_none")]
     pub tolerance: Option<f64>,
     /// One standard deviation, in the unit of the value.

@@ -131,7 +131,7 @@ impl TomlFile {
     }
 }
 
-/// Returns the row in which the text after some bytes starts.
+/// Returns the row that contains the position after these bytes.
 fn row_after(bytes: &[u8]) -> u64 {
     1 + bytes.iter().filter(|&&b| b == b'\n').count() as u64
 }
@@ -217,7 +217,7 @@ impl<'de> Deserializer<'de> for Node<'de> {
         visitor.visit_newtype_struct(self)
     }
 
-    /// A derived struct would accept a list as its fields in order, so lists are refused here.
+    /// Refuses lists: a struct with derived deserialization would accept a list of its fields in order.
     fn deserialize_struct<V: Visitor<'de>>(
         self,
         _: &'static str,

@@ -7,10 +7,9 @@ use crate::{
     column::{Quantity, measures_nothing_else, unit, written_unit},
 };
 
-/// A step of at least this fraction of a turn between two samples is not taken for motion.
+/// A step between two samples counts as a jump and not as motion if it is at least this fraction of a turn.
 const STEP: f64 = 0.25;
-/// Largest difference between a jump and a turn, in usual steps. The motion between the two samples causes this
-/// difference.
+/// Largest difference between a jump and a turn, in usual steps. The difference is the motion between the two samples.
 const USUAL_STEPS: f64 = 3.0;
 /// Fraction of the steps that are not larger than a usual step.
 const USUAL: f64 = 0.99;
@@ -39,12 +38,11 @@ pub struct Wrap {
 impl Wrap {
     /// Detects how a column wraps. Returns `None` if it does not.
     ///
-    /// The unit in the column's name, degrees or radians, determines the size of a turn. A column
-    /// without a unit may have a turn of 360 or 2 pi, if its range is (-1/2, 1/2) or (0, 1) turns.
-    /// A column wraps if its jumps equal a turn apart from the motion between two samples, if its
-    /// values lie within one turn, and if hardly any other step is as large as a quarter of a turn.
-    /// Steps of exactly a turn are taken for commands, so a column with mostly such steps is not a
-    /// wrapped angle. Neither is a column with more jumps than small steps.
+    /// The unit in the column's name, degrees or radians, determines the size of a turn. A column without a unit may
+    /// have a turn of 360 or 2 pi, if its range is (-1/2, 1/2) or (0, 1) turns. A column wraps if three conditions
+    /// hold: its jumps differ from a turn only by the motion between two samples, its values lie within one turn, and
+    /// hardly any other step is as large as a quarter of a turn. A column does not wrap if most of its jumps are
+    /// exactly a turn, because these are probably commands, or if it has more jumps than small steps.
     ///
     /// ```
     /// use stretch_data::Wrap;

@@ -57,8 +57,8 @@ fn identity_of_file(path: &Path) -> Option<Identity> {
     identity(path, &meta)
 }
 
-/// Guards the inputs of this process against being overwritten: [`open_input`] refuses a file that
-/// one of these outputs would replace, and every function that writes refuses a file that was read.
+/// Prevents the process from overwriting its own inputs. After this call, [`open_input`] refuses a file that one of
+/// these outputs would replace, and every function that writes refuses a file that was read.
 ///
 /// A program calls this function once, with the options that name outputs, before its command
 /// starts. Without this call nothing is refused.
@@ -150,7 +150,7 @@ pub fn is_input(path: impl AsRef<Path>) -> io::Result<()> {
     refused.map_or(Ok(()), |why| Err(io::Error::other(why)))
 }
 
-/// Permits that a file is overwritten after it was read, because the command updates it in place.
+/// Permits overwriting a file that was read, for a command that updates the file in place.
 pub fn rewrites(path: impl AsRef<Path>) {
     if let (Some(guard), Some(own)) = (guard().as_mut(), identity_of_file(path.as_ref())) {
         guard.inputs.remove(&own);

@@ -23,8 +23,8 @@ use super::{
 /// file that it points to is replaced. Output is buffered.
 ///
 /// The path `-` is standard output, and so is `/dev/stdout`. Pipes and devices are written to directly. A pipe without
-/// a reader is refused after two seconds. Standard input and disks are refused as targets. It is no error if the reader
-/// of a pipe or of standard output closes it early.
+/// a reader is refused after two seconds. Standard input and disks are refused as targets. If the reader of a pipe or
+/// of standard output closes it early, this is not an error.
 ///
 /// A file that this process has read as an input is not overwritten
 /// ([`guard_inputs`](super::guard_inputs)).
@@ -139,7 +139,7 @@ impl Outputs {
         if let Some(stream) = open_stream(path, meta.as_ref())? {
             let mut out = BufWriter::new(stream);
             let written = fill(&mut out).and_then(|()| out.flush());
-            // What could not be written is not tried again.
+            // Discards bytes that could not be written; dropping the writer would try to write them again.
             let _ = out.into_parts();
             return written;
         }

@@ -23,8 +23,8 @@ pub fn is_standard_output(path: impl AsRef<Path>) -> bool {
 /// Opens a target that takes bytes directly. Returns `None` if the path is a regular file or does
 /// not exist yet.
 ///
-/// Standard output is not opened again: if it is redirected into a file, writing would start again
-/// at the beginning of that file.
+/// Standard output is used through its open handle. Opening it again would write from the beginning of the file if it
+/// is redirected into one.
 pub(super) fn open_stream(
     path: &Path,
     meta: Option<&Metadata>,

@@ -58,11 +58,11 @@ fn expected(job: Job) -> [Files; 2] {
     [before, after].map(|folder| tree(folder.path()))
 }
 
-/// Whether all files are as before the job or all as after it, as far as the job promises that.
+/// Whether all files have the content from before the job or all have the content from after it, as far as the job
+/// promises this.
 ///
-/// Several files are renamed one after the other, so each of them is old or new. If two names
-/// cannot be swapped in one step, a folder that is replaced may still be aside when the process
-/// dies or all calls fail.
+/// Several files are renamed one after the other, so each of them is old or new. If the system cannot swap two names in
+/// one step, a replaced folder may still have its temporary name when the process dies or all calls fail.
 fn is_old_or_new(job: Job, exchanges: bool, at: &Path, [before, after]: &[Files; 2]) -> bool {
     let found = kept(at);
     if job == Job::Together {
@@ -76,8 +76,7 @@ fn is_old_or_new(job: Job, exchanges: bool, at: &Path, [before, after]: &[Files;
         || (job == Job::Folder && !exchanges && is_aside(at, before))
 }
 
-/// Whether the complete old folder is aside, under the temporary name it has while the new one
-/// takes its place.
+/// Whether the complete old folder has a temporary name, as it does while the new folder is renamed to the target.
 fn is_aside(at: &Path, before: &Files) -> bool {
     let inside = tree(at).into_iter().filter_map(|(name, text)| {
         let (temporary, path) = name.split_once(".old/")?;

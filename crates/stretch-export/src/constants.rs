@@ -35,7 +35,7 @@ impl Literal for i64 {
     }
 }
 
-/// The literal has the fewest digits that give the same bits when they are read back.
+/// The literal has as few digits as possible; a compiler reads the same bits from it.
 impl Literal for f32 {
     fn c(&self) -> String {
         format!("{self:?}f")

@@ -89,7 +89,7 @@ pub struct Header {
     pub reference: Label,
     /// The board's converter.
     pub adc: Adc,
-    /// What the header lacks, and why: an integer form, or the watch of the gauge's zero.
+    /// What the header does not contain, and why: an integer form, or the monitor of the gauge's zero.
     pub notes: Vec<String>,
 }
 
@@ -293,7 +293,7 @@ impl Source<'_> {
     }
 }
 
-/// Joins the parts of a header in order.
+/// Joins the parts of a header in the order in which they appear.
 fn assembled(
     source: Source<'_>,
     options: &Options,
@@ -344,7 +344,7 @@ fn assembled(
     Header { text, form, model, pressure, array, step, signals, reference, adc, notes }
 }
 
-/// Returns the constants of the branches.
+/// Returns the C constants for the two branches (directions of motion).
 fn branches(target: Target) -> String {
     let falls = target.reference_per_target() < 0.0;
     let [up, down] = if falls { ["FALLS", "RISES"] } else { ["RISES", "FALLS"] };

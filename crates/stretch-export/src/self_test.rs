@@ -21,7 +21,7 @@ const BRANCH: &str = "(reading.branch << 2) | (reading.domain << 3)";
 /// Number of samples in one cycle up and down.
 const PERIOD: usize = 70;
 
-/// Returns signals that go up and down and exceed both ends of the calibrated range by a tenth of it. In three places,
+/// Returns signals that rise and fall, and exceed the calibrated range by a tenth of it at both ends. In three places,
 /// one, three and five consecutive samples are lost. The signals cover every case of a step.
 fn signals(calibration: &Calibration) -> impl Iterator<Item = Option<f64>> {
     let (min, max) = (calibration.spec().signal_range.min(), calibration.spec().signal_range.max());
@@ -129,8 +129,8 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
         }
         let volts = signal.map_or(NO_SIGNAL, |volts| volts as f32);
         let answer = receptor.step(&mut memory, Volts(volts));
-        // at the edge of the dead band, the computations in 32 and in 64 bits may choose different branches, which is
-        // not an error
+        // if the rate is at the edge of the dead band, the computations in 32 and in 64 bits may choose different
+        // branches; this is not an error
         match (answer, exact.step(&mut exact_memory, Volts(signal.unwrap_or(f64::NAN)))) {
             (Ok(single), Ok(double)) if single.branch == double.branch => {
                 rounding.add(single.estimate, double.estimate);
@@ -155,9 +155,9 @@ pub(crate) fn float(calibration: &Calibration) -> Result<String, ExportError> {
     Ok(kept(&text, if crosstalk.is_some() { &["pressure"] } else { &[] }))
 }
 
-/// Returns samples that go up and down through the calibrated range and beyond it. The recorder delivers nothing for
-/// one sample and for five. The first gauge slips, the second is cut off, the third misses its samples, the fourth
-/// repeats one value, and at last all gauges are cut off.
+/// Returns samples that rise and fall through the calibrated range and beyond it. The samples of all gauges are missing
+/// once for one sample and once for five samples. The first gauge slips, the second is cut off, the third lacks
+/// samples, the fourth repeats one value, and finally all gauges are cut off.
 fn array_samples<const N: usize>(calibration: &ArrayCalibration<N>, n: usize) -> [f32; N] {
     let mut out = [NO_SIGNAL; N];
     if n == 24 || (30..35).contains(&n) {

@@ -284,8 +284,8 @@ fn loads() -> [Loads; 2] {
     })
 }
 
-/// A header loads the record of another calibration and then gives the bits of that calibration. A record that is
-/// refused replaces nothing.
+/// After a header has loaded the record of another calibration, it gives the same bits as that calibration. A record
+/// that is refused replaces nothing.
 #[test]
 fn a_loaded_record_gives_the_same_bits() {
     loaded(&strict_c(), |folder, compiler, input| {
@@ -309,7 +309,7 @@ fn with_avr_gcc_a_loaded_record_gives_the_same_bits() {
     });
 }
 
-/// A header that cannot load a calibration does not compile as one that can.
+/// With `STRETCH_CAN_LOAD` defined, a header that cannot load a calibration does not compile.
 #[test]
 fn a_header_that_cannot_load_is_refused() {
     for (calibration, form) in [
@@ -353,7 +353,7 @@ fn loaded(compilers: &[Compiler], answers: impl Fn(&Path, &Compiler, &str) -> St
     }
 }
 
-/// Of records that are changed and have the right checksum, C loads those that Rust loads.
+/// If a bit of a record is changed and the checksum is renewed, C loads the record if and only if Rust loads it.
 #[test]
 fn a_changed_record_is_loaded_as_in_rust() {
     for (own, other, _) in loads() {
@@ -560,7 +560,7 @@ fn shapes_and_signs_give_the_same_bits() {
     let compilers = strict_c();
     for (name, calibration) in [
         ("a straight line of 21", rate(&poly13, 21, 1)),
-        // the sums of this window exceed 32 bits and are rounded
+        // the sums over this window exceed 32 bits and are rounded
         ("a window of 31", rate(&linear, 31, 2)),
         ("falling", falling),
         ("a falling observer", falling_observer),
@@ -637,7 +637,7 @@ fn knee(at: f64) -> Option<Knee> {
     Some(Knee { at, width: 0.02 })
 }
 
-/// Removes the defects of the example, so that only the curve is left.
+/// Removes all defects from the example. Only the curve remains.
 fn none(map: &mut DiagnosedMap) {
     (map.slip, map.relaxation) = (None, None);
 }
@@ -719,7 +719,8 @@ fn a_header_has_the_defects_that_its_map_has() {
     );
 }
 
-/// A rising signal shortens a muscle, so that its length falls. Without a contraction the reference rises.
+/// For a contraction, a rising signal means that the length of the muscle falls. For any other target the reference
+/// rises with the signal.
 #[test]
 fn a_branch_is_the_direction_of_the_reference() {
     let contraction = stretch_receptor::example_calibration();

@@ -56,8 +56,8 @@ pub(crate) fn array_float<const N: usize>(calibration: &ArrayCalibration<N>) -> 
 fn channels<const N: usize>(constants: &mut Constants, numbers: &ArrayNumbers<f32, N>) {
     let of = &numbers.of[..numbers.channels];
     let states = 1 + numbers.relaxations;
-    // a limit of 0 means that repeated samples are not checked; no count of them reaches the
-    // greatest integer
+    // a limit of 0 means that repeated samples are not checked: the C code then gets the greatest integer, which no
+    // count reaches
     let still = |samples: u16| if samples == 0 { i32::MAX } else { i32::from(samples) };
     let (parents, extends): (Vec<u8>, Vec<u8>) =
         numbers.products[..numbers.terms].iter().copied().unzip();

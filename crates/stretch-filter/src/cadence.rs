@@ -10,11 +10,10 @@ use stretch_core::{Design, DesignError, SampleRate, Seconds, Stage};
 /// [`Arrival::Backwards`]. A receptor of `stretch-receptor` bridges a short gap itself: give it as
 /// many missing samples as the gap has, and reset it only after an [`Arrival::Backwards`].
 ///
-/// Missing samples are counted on a grid of periods and not by single intervals, so a late sample
-/// before an early one is no gap. The grid passes through the earliest stamps. A stamp that is later
-/// than the grid by less than 0.9 periods follows the stamp before it, so jitter of up to 0.45
-/// periods to both sides makes no gap. The grid moves by up to a hundredth of a period per sample,
-/// so a clock that is slower by up to 1% makes no gap either.
+/// Missing samples are counted on a grid of periods and not by single intervals. A late sample that is followed by an
+/// early one therefore causes no gap. The grid passes through the earliest stamps. A sample is missing only if a stamp
+/// is later than the grid by 0.9 periods or more, so jitter of up to 0.45 periods to both sides causes no gap. The grid
+/// moves by up to a hundredth of a period per sample, so a clock that is slower by up to 1 % causes no gap either.
 ///
 /// ```
 /// use stretch_core::{Runner, SampleRate, Seconds};
@@ -39,7 +38,7 @@ pub struct Cadence {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct CadenceMemory {
     last_s: Option<f64>,
-    /// The time at which the last sample was due if it had been as early as the earliest.
+    /// The grid point of the last sample: its stamp would have this value if it were as early as the earliest stamps.
     due_s: f64,
 }
 
@@ -124,7 +123,8 @@ impl Stage<Seconds> for Cadence {
         let late = (time_s - memory.due_s) * self.sample_rate.hz() - 1.0;
         let missing = (late + (1.0 - LATEST)) as u32;
         memory.due_s += (1.0 + f64::from(missing) + DRIFT) * period_s;
-        // The grid starts again at an early sample, and after more samples than can be counted.
+        // The grid starts again at a sample that is earlier than its grid point, and if more samples are missing than
+        // can be counted.
         if memory.due_s > time_s || missing == u32::MAX {
             memory.due_s = time_s;
         }

@@ -25,8 +25,8 @@ fn root_b(window: usize, k: usize) -> f64 {
     libm::sqrt(k * k * (n - k) * (n + k) / (4.0 * (4.0 * k * k - 1.0)))
 }
 
-/// Returns the `order`-th derivatives at `x` (in samples from the middle) of the
-/// orthonormal polynomials of degree 0 ..= `degree`.
+/// Returns the `order`-th derivatives of the orthonormal polynomials of degree 0 ..= `degree`, at a point that is `x`
+/// samples from the middle.
 ///
 /// Needs `degree < window`, `degree <= MAX_SG_DEGREE` and `order <= MAX_SG_DEGREE`.
 pub(crate) fn basis(window: usize, degree: usize, order: usize, x: f64) -> Basis {

@@ -1,11 +1,12 @@
-//! Which estimator of a calibration a design is.
+//! The relation between a filter design and the rate estimator that a calibration names.
 
 use stretch_core::{RateEstimator, SampleRate};
 
-/// A design that gives the rate of a signal, and knows which estimator of a calibration it is.
+/// A filter design that computes the rate of a signal, and knows under which name and parameters a calibration stores
+/// it.
 ///
-/// A receptor refuses a design that is not the estimator with which its calibration was fitted. A design that no
-/// calibration can name, such as one of your own, is not compared: implement the trait without its function.
+/// A receptor refuses a design if its calibration was fitted with another estimator. For a design of your own, which no
+/// calibration can name, implement the trait without its function; the receptor then does not compare.
 ///
 /// ```
 /// use stretch_core::{RateEstimator, SampleRate};
@@ -22,7 +23,7 @@ pub trait NamedRate {
     }
 }
 
-/// Rates that are known already.
+/// No estimator: the caller passes the rate.
 impl NamedRate for () {}
 
 /// Returns the name of a Savitzky-Golay design of derivative order 1.

@@ -43,7 +43,7 @@ enum Kind<T, const CAP: usize> {
 
 /// State of a [`RateFilter`].
 ///
-/// If a step gets the memory of another kind of estimator, it replaces the memory by a fresh one.
+/// If a step is called with the memory of another kind of estimator, it replaces the memory by a fresh one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateMemory<T, const CAP: usize = 64>(Inner<T, CAP>);
 

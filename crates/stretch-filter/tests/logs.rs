@@ -115,8 +115,8 @@ proptest! {
         }
     }
 
-    /// Every stamp is moved by up to `size` periods to both sides, and the clock is slow. A stamp that is early hides a
-    /// loss until a later stamp shows it, so the last fifty samples have no loss.
+    /// Every stamp is moved by up to `size` periods to either side, and the clock is slow. An early stamp can hide a
+    /// lost sample until a later stamp shows it, so no sample is lost among the last fifty.
     #[test]
     fn jitter_makes_no_gap_and_hides_no_loss(
         size in 0.0..0.44_f64, slow in 0.0..0.002_f64, share in 0.0..0.1_f64,

@@ -54,7 +54,7 @@ proptest! {
     fn savitzky_golay_is_exact_on_polynomials(
         shape in shape(), coefficients in prop::collection::vec(-10.0..10.0, 6),
     ) {
-        // Time is in units of the window, so that the problem is equally hard for every length.
+        // Time is measured in window lengths. The polynomials are then equally difficult for every window.
         let span_s = shape.window as f64 / HZ;
         let signal = Signal::Polynomial(coefficients[..=shape.degree].to_vec());
         let derivative = |u: f64| match (&signal, shape.order) {

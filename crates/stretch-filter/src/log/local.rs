@@ -97,7 +97,8 @@ fn stretch_between_gaps<T: Real>(fit: LocalFit, times: &[f64], log: &[T], out: &
 
 /// Returns the derivative at `at_s` of the least-squares polynomial through the window.
 ///
-/// `None` if times are so close that, to rounding, they do not determine a polynomial of the degree.
+/// Returns `None` if the times are so close together that, within rounding errors, they do not determine a polynomial
+/// of this degree.
 fn derivative<T: Real>(fit: LocalFit, times: &[f64], log: &[T], at_s: f64) -> Option<f64> {
     /// A squared norm below this is rounding error. For |u| <= 1, even degree 10 on a one-sided window has norms of
     /// 1e-11.
@@ -118,7 +119,7 @@ fn derivative<T: Real>(fit: LocalFit, times: &[f64], log: &[T], at_s: f64) -> Op
             let p = value_at(&a, &b, k, u);
             norm += p * p;
             first_moment += u * p * p;
-            // The value is relative to the newest sample, so that a large offset costs no digits.
+            // The newest sample is subtracted from each value, because a large offset would cost digits.
             product += p * (x.as_f64() - log[log.len() - 1].as_f64());
         }
         if norm <= LOST {

@@ -13,7 +13,7 @@ use crate::{
 /// reflections. Memory is `TERMS^2 + (TERMS + 4) ROWS` numbers for a log of any length.
 ///
 /// - `TERMS`: number of terms for which there is memory. The default is enough for any degree ([`new`](Self::new)). If
-///   memory is scarce, use the number of the degree, such as `{ Degree::POLY13.terms() }` ([`of`](Self::of)).
+///   memory is scarce, use the number of terms of your degree, such as `{ Degree::POLY13.terms() }` ([`of`](Self::of)).
 /// - `ROWS`: 64 to 256 on a computer (128 is fastest for poly13), 8 to 16 on a microcontroller. It affects speed and
 ///   memory. It affects results only by rounding, which grows with the number of blocks: below 8 rows, logs of more
 ///   than 1e5 samples lose a digit or two, and dependent terms may not be detected.
@@ -202,7 +202,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         let rows = rates.iter().zip(volts).zip(values);
         let samples =
             || rows.clone().map(|((&rate, &volts), &value)| Sample { rate, volts, value });
-        // a fold without early exit, so that the compiler vectorises it
+        // a fold without early exit, because the compiler can vectorise it
         if !samples().fold(true, |sound, sample| sound & self.takes(sample)) {
             let refused = samples().find(|&sample| !self.takes(sample));
             return refused.map_or(Ok(()), |sample| Err(self.refusal(sample)));
@@ -261,8 +261,8 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         self.factor.merge(&other.factor())
     }
 
-    /// Replaces the factor by another one, and returns the factor of all samples so far. One accumulator can thus
-    /// process many logs, and only the factor of each log is kept.
+    /// Replaces the factor by `other`, and returns the factor of all samples so far. One accumulator can process many
+    /// logs in this way: only the factor of each log has to be stored.
     ///
     /// # Errors
     /// [`FitError::MissingTerm`] if the degrees differ; nothing changes then.
@@ -287,8 +287,8 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
         Ok(core::mem::replace(&mut self.factor, other))
     }
 
-    /// Returns the triangular factor of all samples so far. It can be merged, gives fits of this and lower degrees, and
-    /// contains all that is needed of a log.
+    /// Returns the triangular factor of all samples so far. It can be merged with other factors, gives fits of this and
+    /// of lower degrees, and replaces the samples of the log.
     pub fn factor(&self) -> Factor<T, TERMS> {
         if self.filled == 0 {
             return self.factor;

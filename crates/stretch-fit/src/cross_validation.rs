@@ -78,10 +78,11 @@ pub(crate) fn leave_out<T: Real, const TERMS: usize>(
     leave_out_within(trials, 0..trials.len(), &first.without_samples(), visit)
 }
 
-/// Does the same as `leave_out` for the trials of a range. `outside` is the merged factor of all trials outside it.
+/// Does the same as `leave_out`, for the trials of one range. `outside` is the merged factor of all trials outside this
+/// range.
 ///
-/// It recurses into each half of the range after merging the other half into `outside`. Without an allocator there is
-/// no room for lists of merged prefixes and suffixes.
+/// The function calls itself for each half of the range, after merging the other half into `outside`. Lists of merged
+/// prefixes and suffixes would need an allocator.
 fn leave_out_within<T: Real, const TERMS: usize>(
     trials: &[Factor<T, TERMS>],
     Range { start, end }: Range<usize>,

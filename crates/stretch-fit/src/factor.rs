@@ -355,7 +355,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
         let rounding = self.rounding_of(&coefficients);
         let (residual, total) = (self.residual_sum(), self.total_sum());
         let values = total + self.q[0] * self.q[0];
-        // refused if half of the values' digits are lost and rounding exceeds the residuals of the fit
+        // the fit is refused if rounding costs half of the values' digits and exceeds the residuals
         if rounding > residual && rounding > T::epsilon() * values {
             let (rate_power, volts_power) = (0, self.degree().volts());
             return Err(FitError::RankDeficient { rate_power, volts_power });
@@ -398,10 +398,10 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
 
     /// Checks that every column is independent of those before it. The diagonal entry is the part of a column that is
     /// independent, and it must exceed two kinds of rounding error:
-    /// - that of the reflections, which grows as a random walk with the number of folds. The measured error was a tenth
-    ///   of the allowed one, over 1e6 samples in blocks of 8 and more;
-    /// - for powers of the voltage, that of the samples' last digit, which is larger relative to the spread of the
-    ///   volts if the centre is large.
+    /// - the rounding error of the reflections, which grows as a random walk with the number of folds. Over 1e6 samples
+    ///   in blocks of 8 and more, a tenth of the allowed error was measured;
+    /// - for powers of the voltage, the rounding of the samples to their last digit. Relative to the spread of the
+    ///   volts it is larger if the centre is large.
     fn check_rank(&self) -> Result<(), FitError> {
         let walked = libm::sqrt(self.folds as f64) + self.basis.terms() as f64;
         let rounding = T::epsilon() * T::from_f64(8.0 * walked);

@@ -155,9 +155,9 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
         sum
     }
 
-    /// Estimates the condition number (2-norm) of the weighted design matrix in raw volts, by power
-    /// iteration on `R^T R` and on its inverse. The estimate is too small by up to a few per cent.
-    /// A coefficient can lose as many decimal digits as the condition number has.
+    /// Estimates the condition number (2-norm) of the weighted design matrix in raw volts, by power iteration on `R^T
+    /// R` and on its inverse. The estimate is too small by up to a few per cent. Rounding can cost a coefficient as
+    /// many decimal digits as the condition number has.
     pub fn condition(&self) -> T {
         let terms = self.terms();
         let raw = product(terms, &self.r, &shift(self.degree(), self.centre));

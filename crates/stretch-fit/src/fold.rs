@@ -17,8 +17,8 @@ use stretch_core::Real;
 /// Number of SIMD lanes: numbers that one pass of an inner loop processes in parallel.
 const LANES: usize = 4;
 
-/// Returns the sum over the lanes. Lanes two apart are added first, as they lie in registers. With another order the
-/// compiler adds shuffles to the preceding loops.
+/// Returns the sum over the lanes. Lanes 0 and 2, and lanes 1 and 3, are added first, because of their places in the
+/// registers. With another order the compiler adds shuffles to the preceding loops.
 #[inline(always)]
 fn total<T: Real>(sums: [T; LANES]) -> T {
     (sums[0] + sums[2]) + (sums[1] + sums[3])
@@ -115,8 +115,8 @@ impl<T: Real> Reflection<T> {
             return Self { head: T::zero(), beta: T::zero() };
         }
         let norm = square.sqrt();
-        // branch-free selection: the sign changes from fold to fold, and a mispredicted branch costs more than the
-        // arithmetic
+        // selected without a branch: the sign changes from fold to fold, and a mispredicted branch would cost more than
+        // the arithmetic
         let signed = if *d > T::zero() { norm } else { -norm };
         let (head, beta) = (*d + signed, T::one() / (norm * (norm + d.abs())));
         *d = -signed;

@@ -99,8 +99,8 @@ fn bounds_hold_the_truth_as_often_as_they_say() {
             }
         }
     }
-    // The share is that of 7 * 200 bounds, which are correlated within a run. The tolerance of 4.6 % is three standard
-    // errors for the 200 bounds of a single coefficient.
+    // The share is computed from 7 * 200 bounds. The bounds of one run are correlated, so the tolerance is that for 200
+    // bounds of a single coefficient: 4.6 %, three standard errors.
     for (fit, held) in ["plain", "bisquare", "least absolute"].iter().zip(held) {
         let share = held.iter().sum::<usize>() as f64 / (7 * RUNS) as f64;
         assert!((0.95 - 0.046..=0.95 + 0.046).contains(&share), "{fit}: {share}");

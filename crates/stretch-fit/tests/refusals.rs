@@ -199,7 +199,7 @@ fn counts_that_were_damaged_where_they_were_stored_never_panic() {
         for degree in [Degree::POLY13, Degree::new(1, 2).unwrap(), Degree::LINE] {
             let lower = both.restrict(degree).unwrap();
             assert_eq!(lower.samples(), both.samples());
-            // with so many folds the allowed rounding may hide every term, which gives an error
+            // with so many folds the allowed rounding error may exceed every term, and the fit is refused
             let Ok(fit) = lower.fit() else { continue };
             assert!(fit.coefficients().iter().all(|c| c.is_finite()));
             assert!(fit.adjusted_r_squared().is_none_or(f64::is_finite));

@@ -13,8 +13,8 @@ use crate::{
 pub enum Delta {
     /// The range of the estimate: delta in equation 1 of the published method ("the paper").
     Estimate,
-    /// The range of the truth: the stroke. This is fairer, because an estimate with too large a
-    /// range does not reduce its own error.
+    /// The range of the truth: the stroke. This is fairer: with [`Delta::Estimate`], an estimate with too large a range
+    /// reduces its own error.
     Truth,
 }
 

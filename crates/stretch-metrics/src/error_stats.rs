@@ -24,10 +24,9 @@ pub struct Pair<T> {
 /// Error statistics of an estimate against the truth: count, bias, MAE, RMSE, standard deviation,
 /// largest error.
 ///
-/// The error is e = estimate - truth, in the unit of both. Moments are computed by Welford's method
-/// with compensated sums, so an `f32` stream of ten million samples loses no digits because of its
-/// length. [`merge`](Self::merge) gives the same result, up to rounding, as one stream of all
-/// samples.
+/// The error is e = estimate - truth, in the unit of both. Moments are computed by Welford's method with compensated
+/// sums. Therefore even an `f32` stream of ten million samples loses no digits. [`merge`](Self::merge) gives the same
+/// result, up to rounding, as one stream of all samples.
 ///
 /// A pair that is not finite, or whose squared errors could overflow in a sum (magnitude above
 /// about 1e15 in `f32`, 1e150 in `f64`), is refused and counted in [`skipped`](Self::skipped).

@@ -8,8 +8,8 @@ use crate::MetricsError;
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Lag {
-    /// Number of samples by which the estimate lags the truth, interpolated by a parabola; negative
-    /// if it leads. Multiply by the sampling interval to get seconds.
+    /// Number of samples by which the estimate lags behind the truth, interpolated by a parabola; negative if the
+    /// estimate leads. Multiply by the sampling interval to get seconds.
     pub samples: f64,
     /// Pearson's correlation at the best whole lag.
     pub correlation: f64,
@@ -23,12 +23,11 @@ pub struct Lag {
 
 /// Estimates the lag of `estimate` behind `truth`, by normalised cross-correlation.
 ///
-/// For each whole lag k from `-max_lag` to `max_lag`, r(k) is Pearson's correlation of `truth[i]`
-/// with `estimate[i + k]` over the overlapping samples. Means and scales are computed for each
-/// overlap, so offset, gain and the length of the overlap do not bias the result. The function
-/// takes the greatest r(k), on a tie that with the smaller |k|. A parabola through it and its
-/// neighbours gives the position of the peak between samples. Both signals must be sampled
-/// uniformly, at the same times. The cost is `n (2 max_lag + 1)` steps of five multiply-adds,
+/// For each whole lag k from `-max_lag` to `max_lag`, r(k) is Pearson's correlation of `truth[i]` with `estimate[i +
+/// k]` over the overlapping samples. Means and scales are computed for each overlap, so offset, gain and the length of
+/// the overlap do not bias the result. The function takes the greatest r(k); if two are equal, the one with the smaller
+/// |k|. A parabola through this value and its two neighbours gives the position of the peak between samples. Both
+/// signals must be sampled uniformly, at the same times. The cost is `n (2 max_lag + 1)` steps of five multiply-adds,
 /// without extra memory.
 ///
 /// # Errors
@@ -66,7 +65,7 @@ pub fn lag<T: Real>(truth: &[T], estimate: &[T], max_lag: usize) -> Result<Lag, 
         }
     }
     let at_limit = max_lag > 0 && best.unsigned_abs() == max_lag;
-    // One step beyond the limit, the overlap is still more than half of the samples.
+    // For a lag of one sample beyond the limit, the overlap still contains more than half of the samples.
     let (before, after) = (at(best - 1), at(best + 1));
     let bend = before - 2.0 * peak + after;
     let within = before <= peak && after <= peak && bend < 0.0;

@@ -10,9 +10,9 @@ use crate::{
 
 /// Accumulates the differences of paired samples for Student's paired t test.
 ///
-/// With the differences d, t = mean(d) / (s_d / sqrt(n)) with n - 1 degrees of freedom. The test assumes independent pairs. Neighbouring samples of a recording are correlated,
-/// so P is far too small. [`PairedBlocks`](crate::PairedBlocks) tests means over blocks, whose P is
-/// more realistic. Report both.
+/// With the differences d, t = mean(d) / (s_d / sqrt(n)) with n - 1 degrees of freedom. The test assumes independent
+/// pairs. Neighbouring samples of a recording are correlated, so P is far too small.
+/// [`PairedBlocks`](crate::PairedBlocks) tests means over blocks, which gives a more realistic P. Report both values.
 ///
 /// ```
 /// use stretch_metrics::PairedT;

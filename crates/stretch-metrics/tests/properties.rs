@@ -88,8 +88,8 @@ proptest! {
         // The first five have the unit of the signals, the others are dimensionless.
         let scaled: Vec<_> = before[..5].iter().map(|x| x.map(|x| scale * x)).collect();
         same(&after[..5], &scaled, tolerance::METRICS_SHIFT)?;
-        // If range and SST are small compared with the rounding of the shift, no digits are left to
-        // compare.
+        // If range and SST are small compared with the rounding error of the shift, the results have no correct digits
+        // to compare.
         let spread = pairs.iter().map(|p| p.0).fold(f64::MIN, f64::max)
             - pairs.iter().map(|p| p.0).fold(f64::MAX, f64::min);
         if spread > 1.0 {

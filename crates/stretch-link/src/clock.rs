@@ -8,11 +8,11 @@ use crate::{Event, Frame};
 /// at 2^32 ms. A board that restarts begins its clock at zero; the step is then the time that
 /// passed at the receiver, and at least one sample period. Times are rounded to 1 us.
 ///
-/// If samples are two or more milliseconds apart, a frame with the same millisecond as the previous
-/// frame has no time, because the board's clock has stopped and no time is invented. Faster samples
-/// share a millisecond; their times are 1 us apart, which keeps their order. The next millisecond
-/// counts from the first of them, so the time line does not run fast. After 1,000 frames with the
-/// same millisecond the clock has stopped.
+/// If the sample period is two milliseconds or more, two frames with the same millisecond mean that the board's clock
+/// has stopped. The second frame then gets no time, because any time would be invented. Faster samples can share a
+/// millisecond. Their times are 1 us apart, which keeps their order. The time of the next millisecond is counted from
+/// the first of them, so the time line does not run fast. After 1,000 frames with the same millisecond the clock counts
+/// as stopped.
 ///
 /// ```
 /// use stretch_link::{Answer, Event, Frame, TimeLine};
@@ -47,8 +47,7 @@ struct Last {
     heard_s: f64,
 }
 
-/// Sample period, s, from which on two samples never have the same millisecond, even if the board's
-/// clock jitters.
+/// Smallest sample period, s, at which two samples never have the same millisecond, even if the board's clock jitters.
 const APART_S: f64 = 2e-3;
 
 impl TimeLine {
@@ -63,7 +62,7 @@ impl TimeLine {
     /// board's clock has stopped.
     pub fn time_s(&mut self, event: &Event, now_s: f64) -> Option<f64> {
         let Frame { time_ms: board_ms, .. } = event.frame()?;
-        // sums of steps carry rounding errors
+        // removes the rounding errors of a sum of steps
         let rounded = |time_s: f64| libm::round(time_s * 1e6) / 1e6;
         let mut began_s = None;
         let time_s = match self.last {

@@ -2,7 +2,7 @@
 
 use crate::{Answer, Frame, frame::Refused};
 
-/// The result of a byte that completes or breaks off a line.
+/// The result of a byte that completes a line or ends it early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Event {
@@ -81,7 +81,7 @@ const HALF: u32 = u32::MAX / 2;
 enum State {
     /// Between frames; no byte has come since the last line end.
     Idle,
-    /// Among bytes that belong to no frame.
+    /// Inside bytes that belong to no frame.
     Noise,
     /// Inside a frame.
     Frame,
@@ -128,7 +128,7 @@ impl Decoder {
                 Some(self.line(length))
             }
             b'\n' => self.abandon(),
-            // some terminals add this to a newline
+            // ignored, because some terminals add it to a newline
             b'\r' => None,
             _ if self.state == State::Frame && self.length < self.line.len() => {
                 self.line[self.length] = byte;
@@ -144,8 +144,7 @@ impl Decoder {
         }
     }
 
-    /// Ends the stream, for example when a cable was pulled. Bytes that come later do not complete
-    /// the current frame.
+    /// Ends the current line, for example after a cable was pulled. Later bytes do not complete the current frame.
     ///
     /// A frame that lacks only its newline is complete, because the checksum is its last field.
     pub fn disconnected(&mut self) -> Option<Event> {

@@ -118,7 +118,7 @@ proptest! {
         for frame in &out {
             prop_assert!(sent.any(|other| other == frame), "{frame:?} was not sent, or not then");
         }
-        // every frame between the first and the last decoded one counts as received or as lost
+        // every frame between the first and the last decoded frame is counted, either as received or as lost
         if let (Some(first), Some(last)) = (out.first(), out.last()) {
             let span = u64::from(last.counter.wrapping_sub(first.counter)) + 1;
             prop_assert_eq!(counts.frames + counts.lost, span);

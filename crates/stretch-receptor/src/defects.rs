@@ -4,13 +4,13 @@ use stretch_core::{DiagnosedMap, Fading, Knee, Plays, Real, Worn, arithmetic::la
 
 use crate::fold::held;
 
-/// Distance, in widths, of a soft knee from its bound where the input equals the bound: ln 2.
+/// If the input of a soft knee equals its bound, the output differs from the bound by this number of widths: ln 2.
 const LN_2: f64 = core::f64::consts::LN_2;
 
 /// The defects of a [`DiagnosedMap`] in the order in which they act, with their rates folded to one sample.
 ///
-/// The parts that do not depend on the target are computed once per sample, so that the drives (inputs of the curve) of
-/// several targets cost little more than their plays (backlash operators).
+/// The parts that do not depend on the target are computed once per sample. Computing the drive (input of the curve) of
+/// a further target then costs little more than its plays (backlash operators).
 ///
 /// ```
 /// use stretch_receptor::{Defects, example_diagnosed};
@@ -36,7 +36,7 @@ pub struct Defects<T> {
     pub slip: Option<Played<T>>,
     /// Coefficients of the pressure and of its square.
     pub crosstalk: Option<[T; 2]>,
-    /// The gauge follows another path on the way back.
+    /// The gauge has hysteresis.
     pub hysteresis: Option<Played<T>>,
     /// The gauge relaxes or overshoots.
     pub relaxation: Option<Relaxing<T>>,
@@ -128,7 +128,7 @@ impl<T: Copy> DefectsMemory<T> {
         self.travelled
     }
 
-    /// Returns the same memory with the travel of another memory.
+    /// Returns this memory with the travel replaced by that of another memory.
     pub(crate) fn as_worked(self, other: &Self) -> Self {
         Self { travelled: other.travelled, ..self }
     }
@@ -160,8 +160,8 @@ impl<T: Real> Played<T> {
         Self { radii: plays.radii.map(T::from_f64), each: T::from_f64(plays.share / 3.0) }
     }
 
-    /// Returns u - play(at, u, radius), the distance by which the play is behind u, without computing the two ends of
-    /// the play.
+    /// Returns u - play(at, u, radius), the distance by which the output of the play is behind u. The function does not
+    /// compute the two ends of the play.
     #[inline(always)]
     fn apart(&self, i: usize, at: T, u: T) -> T {
         let (behind, radius) = (u - at, self.radii[i]);
@@ -213,8 +213,8 @@ impl<T: Real> Relaxing<T> {
         }
     }
 
-    /// What earlier samples contribute to the relaxed drive. The present sample contributes its own drive times
-    /// [`Self::own`].
+    /// Returns the part of the relaxed drive that comes from earlier samples. The present sample adds its own drive
+    /// times [`Self::own`].
     #[inline(always)]
     fn past(fading: &[T; 3]) -> T {
         fading[0] + fading[1] + fading[2]
@@ -373,7 +373,7 @@ impl<T: Real> Defects<T> {
         self.crosstalk.map_or(T::zero(), |[a, b]| pressure * (a + b * pressure))
     }
 
-    /// Returns the stretch of a sleeve that may go slack, at a target.
+    /// Returns the stretch of the sleeve at a target, with the slack of the sleeve.
     #[inline(always)]
     fn taut(&self, y: T) -> T {
         between(self.slack_low, self.slack_high, y)

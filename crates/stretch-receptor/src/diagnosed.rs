@@ -20,28 +20,30 @@ pub const LEAST_ANSWER: f64 = 0.05;
 /// Weight s of a new sample in the smoothed signal, which keeps the share s/(2 - s) of the noise's variance.
 pub const SMOOTH: f64 = 0.33;
 const SHOWN: f64 = 0.2;
-/// A sleeve counts as reversed when the smoothed signal has come back by this many of its standard deviations.
+/// The sleeve counts as having reversed its motion when the smoothed signal has changed in the opposite direction by
+/// this many of its standard deviations.
 const TURN_DEVIATIONS: f64 = 6.0;
-/// Greatest standard deviation of a target, in multiples of the one that a single noisy signal gives at the mean slope
-/// of the curve.
+/// Greatest standard deviation of a target. The unit is the standard deviation of a target that is computed from one
+/// noisy sample, at the mean slope of the curve.
 const WIDEST: f64 = 4.0;
-/// The estimate exceeds the fitted targets by at most this share of their range.
+/// An estimate is at most this far outside the range of the fitted targets, as a share of that range.
 const BEYOND: f64 = 0.003;
 
 /// A receptor for [`Model::Diagnosed`].
 ///
 /// For each sample:
 /// 1. target and rate are predicted, with a rate that decays with the time constant `steady_s`; their covariance grows;
-/// 2. the drive (the input of the gauge's curve) of the predicted target is compared with the drive at which the curve
-///    has the signal. A second target is the predicted one moved by the difference, and its drive is computed as well;
+/// 2. two drives (inputs of the gauge's curve) are compared: that of the predicted target, and the one at which the
+///    curve has the measured signal. The predicted target plus the difference is a second target, and its drive is
+///    computed as well;
 /// 3. the secant between the two targets is the slope of a Kalman step;
 /// 4. the defects are advanced with the estimated target. If the sleeve slips on the muscle, the filter estimates the
 ///    position of the sleeve, and the muscle is taken to be ahead of the sleeve in the direction of the last certain
 ///    movement.
 ///
-/// While a play, a clipped end or a delay hides the target, the predicted motion therefore determines the estimate.
-/// [`Reading::sd`] is the standard deviation of the estimate. A skew (delay of the signal) is compensated by
-/// prediction, so that the estimate is that of the present. There is an estimate from the first sample on. If the map
+/// Therefore, while a play, a clipped end of the curve or a delay hides the target, the estimate follows the predicted
+/// motion. [`Reading::sd`] is the standard deviation of the estimate. A skew (delay of the signal) is compensated by
+/// prediction: the estimate is valid for the present time. There is an estimate from the first sample on. If the map
 /// has a crosstalk, set the pressure with [`ReceptorMemory::set_pressure`] before a sample.
 ///
 /// ```
@@ -83,16 +85,17 @@ pub struct Diagnosed<T> {
     pub low: T,
     /// The greatest target.
     pub high: T,
-    /// Seconds over which the estimate is extrapolated at its rate. They are fewer than the lag that they compensate,
-    /// because the modelled rate decays.
+    /// Time over which the estimate is extrapolated at its rate, in seconds. It is shorter than the delay that it
+    /// compensates, because the modelled rate decays.
     pub ahead_s: T,
     /// Factor from the filter's standard deviation to the one that is reported, in reference units.
     pub spread: T,
     /// Half-width of the sensor's slip.
     pub slip: T,
-    /// A sleeve counts as reversed when the signal has come back by more than this.
+    /// The sleeve counts as having reversed its motion when the signal has changed in the opposite direction by more
+    /// than this.
     pub turn_threshold: T,
-    /// Variance of the muscle's position if it may be anywhere in the slip.
+    /// Variance of the muscle's position if the muscle may be anywhere within the slip of the sleeve.
     pub slip_variance: T,
     /// Share of the remaining difference by which, at each sample, the variance hidden by the slip approaches
     /// `slip_variance`.
@@ -125,8 +128,8 @@ pub struct DiagnosedMemory<T> {
     slipped: T,
     /// Furthest point of the sleeve in the direction of its last movement, in signal.
     reached: T,
-    /// The smoothed signal that the sleeve would give without memory. Reversals are detected in it, not in the filter's
-    /// own target, because a filter with a rate overshoots where the motion stops.
+    /// The smoothed signal that the sleeve would give without memory. Reversals are detected in this signal and not in
+    /// the filter's target, because a filter with a rate overshoots when the motion stops.
     shown: T,
 }
 
@@ -165,7 +168,8 @@ impl<T: Real> Diagnosed<T> {
         let (sign, period_s) = (polarity.sign(), sample_rate.period_s());
         let (gain, zero) = output(calibration);
         let knots = map.curve.len();
-        // a curve against the polarity would be inverted in the wrong direction
+        // a curve that falls, after multiplication by the sign of the polarity, would be inverted in the wrong
+        // direction
         let rises = sign * (map.curve[knots - 1] - map.curve[0]);
         DesignError::check("rise of diagnosed.curve", rises, rises > 0.0)?;
         let widest = WIDEST * map.noise * (map.drive_domain.max - map.drive_domain.min) / rises;
@@ -173,11 +177,12 @@ impl<T: Real> Diagnosed<T> {
         // a slow amplifier delays a ramp by the sum of its time constants
         let slow: f64 = map.lowpass_s.into_iter().flatten().sum();
         let (skew, steady) = (map.skew_s + slow, map.steady_s);
-        // distance that a decaying rate covers in that time, per unit of rate; for a negative skew the rate is taken as
-        // constant
+        // distance that the target moves in this time per unit of rate, with the rate decaying; for a negative skew the
+        // rate is taken as constant
         let ahead = if skew > 0.0 { -steady * libm::expm1(-skew / steady) } else { skew };
         let edge = BEYOND * (map.estimate_domain.max - map.estimate_domain.min);
-        // the filter estimates the sleeve; its reversals determine the position of the muscle inside
+        // the filter estimates the position of the sleeve; the reversals of the sleeve determine the position of the
+        // muscle in it
         let slip = map.slip.map_or(0.0, |p| p.radii.iter().sum::<f64>() / 3.0);
         let defects = Defects::new(&DiagnosedMap { slip: None, lowpass_s: None, ..*map }, period_s);
         let model = Self {
@@ -209,11 +214,12 @@ impl<T: Real> Diagnosed<T> {
         Ok(Self { at_rest: at_rest.0, ..model })
     }
 
-    /// Begins with the target that would give the signal at rest, and with the defects settled at that target.
+    /// Starts from the target that would give this signal at rest, and from the settled state of the defects at this
+    /// target.
     fn begin(&self, memory: &mut DiagnosedMemory<T>, signal: T) {
         let (to, _) = self.curve.inverse(signal);
         let mut target = held(to, self.low, self.high);
-        // plays offset the drive by a constant; the repetitions account for nonlinear defects
+        // plays add a constant to the drive; the iteration is needed for nonlinear defects
         for _ in 0..3 {
             let defects = self.defects.begin(target, memory.pressure);
             let poised = self.defects.poise(&defects, memory.pressure);
@@ -241,8 +247,8 @@ impl<T: Real> Diagnosed<T> {
         let [yy, yr, rr] = memory.covariance;
         let across = yr + dt * rr;
         let grown = yy + dt * (yr + across);
-        // where the signal hardly depends on the target, an unbounded variance would move the target from end to end
-        // of the flat part
+        // the variance is limited: where the signal hardly depends on the target, noise would otherwise move the target
+        // from one end of the flat part to the other
         let (grown, across) = if grown > self.widest {
             let share = self.widest / grown;
             (share * grown, share * (kept * across))
@@ -266,7 +272,7 @@ impl<T: Real> Diagnosed<T> {
         }
     }
 
-    /// Returns the shift that memory would cause now in the signal of a target at rest.
+    /// Returns by how much the memory of the gauge would shift the signal if the target were at rest now.
     #[inline(always)]
     fn rest_shift(&self, memory: &DiagnosedMemory<T>) -> T {
         if memory.target.is_nan() {
@@ -284,7 +290,7 @@ impl<T: Real> Diagnosed<T> {
         let here = memory.target;
         let drive = self.defects.drive(&memory.defects, &poised, here);
         let (predicted, tangent) = self.curve.forward(drive);
-        // a spike is limited to one whole span of the curve beyond its end
+        // the signal is limited to one span of the curve beyond its ends, because of spikes
         let (first, last) = self.curve.ends();
         let span = last - first;
         let bounded = held(signal, first - span, last + span);
@@ -298,8 +304,8 @@ impl<T: Real> Diagnosed<T> {
         let probe = if far { run } else { toward * least };
         let moved = self.defects.drive(&memory.defects, &poised, here + probe) - drive;
         let answer = greater(moved / probe, T::from_f64(LEAST_ANSWER));
-        // the slope of the curve: the greater of secant and tangent, so that a flat end of the curve does not move the
-        // estimate far
+        // the slope of the curve is the greater of secant and tangent; the tangent alone would move the estimate far at
+        // a flat end of the curve
         let secant = if far { surprise / run } else { tangent };
         let slope = answer * greater(secant, tangent);
         let [yy, yr, rr] = memory.covariance;
@@ -404,7 +410,7 @@ impl<T: Real> Live for Diagnosed<T> {
         begun
     }
 
-    /// The variance of target and rate grows, so that the next sample counts more than the prediction.
+    /// Increases the variance of target and rate. The next sample then has more weight than the prediction.
     fn pause(&self, memory: &mut DiagnosedMemory<T>) {
         self.bridge(memory, 0);
     }

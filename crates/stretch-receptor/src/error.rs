@@ -30,7 +30,7 @@ impl From<FilterError> for ReceptorError {
     fn from(error: FilterError) -> Self {
         match error {
             FilterError::Design(error) => Self::Calibration(error),
-            // the other errors concern recordings; a design does not cause them
+            // all other errors are about recordings and cannot occur in a design
             _ => Self::LooksAhead,
         }
     }

@@ -5,9 +5,9 @@ use stretch_filter::LARGEST_SAMPLE;
 
 use crate::Withheld;
 
-/// Largest number of missing samples in a row that are bridged by prediction. After a further missing sample a model
-/// assumes that the target rests where it was: the memory of the sensor (plays and relaxations) is kept and relaxes, an
-/// observer answers the next sample at once, and a model with a rate estimator warms up again.
+/// Largest number of missing samples in a row that are bridged by prediction. From the next missing sample on, a model
+/// assumes that the target rests where it was. It keeps the plays of the sensor, and the relaxations decay. At the next
+/// sample an observer has an estimate at once, whereas a model with a rate estimator warms up again.
 pub const MAX_BRIDGED: u8 = 3;
 
 /// A model behind a [`Front`].
@@ -40,7 +40,7 @@ pub trait Live: Design {
         *memory = self.memory();
     }
 
-    /// Forgets the motion before a long gap. What changes slowly, such as a baseline, is kept.
+    /// Resets the state of the motion after a long gap. Slow states, such as a baseline, are kept.
     fn restart(&self, memory: &mut Self::Memory) {
         *memory = self.memory();
     }
@@ -103,12 +103,12 @@ pub struct Front<M> {
 pub struct ReceptorMemory<M, S = Branch> {
     pub(crate) model: M,
     side: S,
-    /// Missing samples in a row; [`MAX_BRIDGED`] if there is nothing to predict from.
+    /// Number of consecutive missing samples; [`MAX_BRIDGED`] if no prediction is possible.
     missing: u8,
 }
 
 impl<M, S: Side> ReceptorMemory<M, S> {
-    /// Returns the same memory on another branch, for a stream that is known to begin contracted.
+    /// Returns this memory with another branch, for example for a stream that begins with a contracted muscle.
     ///
     /// ```
     /// use stretch_core::{Branch, Runner, SampleRate, Seconds, Volts};
@@ -153,8 +153,8 @@ impl<M> Front<M> {
 }
 
 impl<M: Live> Front<M> {
-    /// Starts again after a gap of seconds, in which the target may have moved anywhere: the next sample is treated as
-    /// the first one. The branch, a baseline and the pressure are kept.
+    /// Starts again after a gap of seconds, because the target may have moved anywhere in it: the next sample is
+    /// treated as the first one. The branch, a baseline and the pressure are kept.
     ///
     /// ```
     /// use stretch_core::{Design, Stage, Volts};

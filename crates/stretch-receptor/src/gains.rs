@@ -6,8 +6,8 @@ use stretch_core::{
 
 /// Number of states: the target, its rate, and the relaxations.
 pub(crate) const STATES: usize = 2 + MAX_OBSERVER_RELAXATIONS;
-/// Number of slopes of the curve for which gains are computed, evenly spaced in ratio from the flattest to the steepest
-/// slope. Twice and eight times as many gave the same errors.
+/// Number of slopes of the curve for which gains are computed. They are evenly spaced on a logarithmic scale from the
+/// flattest to the steepest slope. With twice and eight times as many slopes the errors were the same.
 pub(crate) const SLOPES: usize = 12;
 /// Largest number of doublings. After `n` doublings the covariance is that after `2^n` samples.
 const DOUBLINGS: usize = 30;
@@ -30,7 +30,7 @@ impl Gains {
     /// Computes the gains of `map` at `period_s`, for the slopes of its curve times `sign`, in signal per drive.
     ///
     /// # Errors
-    /// A curve against the polarity, because it would be inverted in the wrong direction.
+    /// A curve whose direction contradicts the polarity, because it would be inverted in the wrong direction.
     pub(crate) fn new(map: &ObserverMap, sign: f64, period_s: f64) -> Result<Self, DesignError> {
         let Interval { min, max } = map.drive_domain;
         let step = (max - min) / (map.curve.len() - 1) as f64;
@@ -70,7 +70,7 @@ fn settled(map: &ObserverMap, period_s: f64, slope: f64) -> [f64; STATES] {
         (a[0][2 + i], a[1][2 + i], a[2 + i][2 + i]) = (share, share * period_s, 1.0 - share);
     }
     a[1][0] = period_s;
-    // the transition of an unused state is set to zero, because the state would keep its variance
+    // the transition of an unused state is set to zero; otherwise the state would keep its variance
     for unused in 2 + map.relaxations_s.len()..STATES {
         a[unused][unused] = 0.0;
     }

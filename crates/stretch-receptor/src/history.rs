@@ -23,8 +23,8 @@ use crate::{
 /// 4. the estimator `R` gives the rate of the estimate. Outside the dead band, which is converted to the reference, the
 ///    sign of the rate gives the branch.
 ///
-/// Every state begins settled at the first sample. Warm-up, missing samples and branch are handled as in every
-/// [`Front`]. A gap is bridged with the last sample; after a longer gap the rate estimator starts again.
+/// At the first sample every state is set to its steady state. Warm-up, missing samples and branch are handled as in
+/// every [`Front`]. A gap is bridged with the last sample; after a longer gap the rate estimator starts again.
 ///
 /// Cost: a product and a sum for each term, a product for each state.
 pub type HistoryReceptor<T, R = RateFilter<T>> = Front<History<T, R>>;

@@ -25,12 +25,12 @@ const LEAST_RUN: f64 = 0.01;
 ///
 /// A sample corrects every state by a gain times the innovation (signal minus predicted signal). The gain is the
 /// stationary gain of a Kalman filter for the slope of the curve, from a table that is computed with the receptor. A
-/// covariance recursion costs twenty times as much and has larger errors, because the slope changes faster than a
-/// covariance can follow. The slope is the greater of two: the tangent at the prediction, and the secant to the drive
+/// covariance recursion would cost twenty times as much and give larger errors, because a covariance adapts more slowly
+/// than the slope changes. The slope is the greater of two: the tangent at the prediction, and the secant to the drive
 /// at which the curve has the signal. A flat end of the curve therefore does not move the estimate far.
 ///
-/// The tracker of the baseline compares the signal with the one that a target at rest would give now, including the
-/// effect of memory. Therefore an undershoot after a fast release is not taken for drift.
+/// The tracker of the baseline compares the signal with the signal that a target at rest would give now, including the
+/// effect of memory. Therefore it does not take an undershoot after a fast release for drift.
 pub type ObserverReceptor<T> = Front<Observer<T>>;
 
 /// The model of an [`ObserverReceptor`].
@@ -177,7 +177,7 @@ impl<T: Real> Observer<T> {
         drive
     }
 
-    /// Returns the shift that memory would cause now in the signal of a target at rest.
+    /// Returns by how much the memory of the gauge would shift the signal if the target were at rest now.
     #[inline(always)]
     fn rest_shift(&self, memory: &ObserverMemory<T>) -> T {
         if memory.states[0].is_nan() {
@@ -198,7 +198,7 @@ impl<T: Real> Observer<T> {
         let secant = if far { (held - predicted) / run } else { tangent };
         let slope = tangent.max(secant);
 
-        // a spike is limited to one whole span of the curve beyond its end
+        // the signal is limited to one span of the curve beyond its ends, because of spikes
         let (first, last) = self.curve.ends();
         let span = last - first;
         let surprise = signal.max(first - span).min(last + span) - predicted;

@@ -64,7 +64,7 @@ impl<T: Real> Receptor<T> {
     /// or a coefficient leaves the range of `T`.
     pub fn new(calibration: &Calibration) -> Result<Self, ReceptorError> {
         match &calibration.spec().model {
-            // the rate of these models is a state, so that no estimator is needed
+            // in these models the rate is a state, so they need no estimator
             Model::Observer(_) | Model::Diagnosed(_) => Self::observer(calibration),
             _ => Self::with_rate(calibration, estimator(calibration)?),
         }

@@ -4,7 +4,7 @@ use core::fmt;
 
 use stretch_core::{Branch, Millimetres, MillimetresPerSecond, Real};
 
-/// An answer: the estimate, its rate, and the quality of the estimate.
+/// An answer: the estimate, its rate, its branch and domain, and its standard deviation if the model computes one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reading<T = f64> {

@@ -24,8 +24,8 @@ use crate::{
 /// curve for both branches) answers from the first sample on. The rate of such a reading is 0 until the rate estimator
 /// has seen enough samples.
 ///
-/// **Missing samples and the branch** are handled as in every [`Front`]. A short gap is bridged by the last sample,
-/// extrapolated at the last rate, so that one lost sample costs one reading and not a warm-up.
+/// **Missing samples and the branch** are handled as in every [`Front`]. A short gap is bridged: the last sample is
+/// extrapolated at the last rate. Therefore one lost sample costs one reading and not a warm-up.
 ///
 /// **Reset**: start from a fresh [`Design::memory`]; the `reset` of a [`Runner`](stretch_core::Runner) does this.
 ///

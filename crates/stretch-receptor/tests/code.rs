@@ -39,8 +39,8 @@ struct Compared {
     worst: f64,
 }
 
-/// Runs both receptors over `codes` and checks everything but the size of the error, which it
-/// returns, in thousandths.
+/// Runs both receptors over `codes` and checks that they agree in everything except the estimate. Returns the largest
+/// difference of the estimates, in thousandths.
 fn compare(
     calibration: &Calibration,
     adc: &Adc,
@@ -62,7 +62,7 @@ fn compare(
             (ours, theirs) => return Err(format!("sample {n}: {:?} {theirs:?}", ours.is_ok())),
         };
         if ours.branch != theirs.branch {
-            // on the very edge of the dead band the float receptor rounds to either side
+            // exactly at the edge of the dead band, rounding decides which branch the float receptor chooses
             let tie = rate.is_some_and(|r| (r.abs() - calibration.spec().dead_band).abs() < 1e-9);
             return if tie { Ok(found) } else { Err(format!("sample {n}: branch")) };
         }
@@ -76,8 +76,8 @@ fn compare(
     Ok(found)
 }
 
-/// Whether an input lies on an end of the domain within the rounding of `f64`. The integers are
-/// exact there, and the floats may fall on either side.
+/// Whether an input equals an end of the domain within the rounding of `f64`. The integers are exact there, whereas
+/// rounding may put the floats on either side.
 fn at_an_end(
     calibration: &Calibration,
     branch: Branch,
@@ -277,7 +277,7 @@ proptest! {
             bytes[at.index(bytes.len())] = value;
         }
         if let Ok(damaged) = postcard::from_bytes::<FixedCalibration<11, 2>>(bytes) {
-            // arithmetic overflow panics in this profile
+            // the test profile panics on arithmetic overflow
             let mut receptor = Runner::new(FixedReceptor::new(damaged));
             for code in codes {
                 let _ = receptor.step(AdcCode(code));

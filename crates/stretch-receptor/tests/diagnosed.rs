@@ -136,10 +136,10 @@ fn inverted(map: DiagnosedMap, pressure: impl Fn(f64) -> f64) -> (f64, f64) {
 }
 
 /// With this noise, the estimate of a gauge without defects has an error of 0.002 of the stroke. Defects that hide no
-/// motion are inverted about as well. A play or a delay adds about as much error as the motion that it hides: after a
-/// reversal, a slip of 0.02 causes an error until the filter detects that the sleeve has turned, and a skew must be
-/// bridged by prediction. The filter's standard deviation leaves out errors in the memory of its defects. A fit
-/// measures the share of these errors ([`DiagnosedMap::spread`]), which is 1 here.
+/// motion are inverted about as well. A play or a delay adds an error of about the motion that it hides: after a
+/// reversal, a slip of 0.02 causes an error until the filter detects the reversal of the sleeve, and a skew must be
+/// bridged by prediction. The filter's standard deviation does not include errors in the states of its defects. A fit
+/// corrects this with a measured factor ([`DiagnosedMap::spread`]), which is 1 here.
 #[test]
 fn every_defect_is_inverted() {
     let knee = |at| Some(Knee { at, width: 0.01 });
@@ -223,7 +223,7 @@ fn lost_samples_are_predicted_over_and_wrong_models_refused() {
     for _ in 0..10 {
         let _ = receptor.step(&mut other, Volts(f64::NAN));
     }
-    // in a long gap the variance grows, and the next sample counts almost alone
+    // in a long gap the variance grows, and the next sample determines the estimate almost alone
     assert!(receptor.step(&mut other, Volts(1.4)).unwrap().rate.abs() < 1e3);
     let refused = DiagnosedReceptor::<f32>::new(&example_observer()).unwrap_err();
     assert!(refused.to_string().contains("diagnosed"), "{refused}");

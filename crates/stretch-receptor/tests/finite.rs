@@ -31,7 +31,7 @@ fn numbers(value: &Value, path: String, found: &mut Vec<String>) {
 
 /// A calibration of any kind with some of its numbers replaced; `None` if it is no longer valid.
 fn spoilt() -> impl Strategy<Value = Option<Calibration>> {
-    // a number is scaled or replaced, or all signals are scaled at once, as by a change of units
+    // either a number is scaled or replaced, or all signals are scaled together, as if the unit had changed
     let change = (any::<Index>(), number(), any::<bool>());
     (stretch_strategies::calibration(), vec(change, 0..5), prop::option::of(-9i32..9)).prop_map(
         |(calibration, changes, units)| {

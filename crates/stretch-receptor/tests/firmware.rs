@@ -26,7 +26,7 @@ fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../firmware")
 }
 
-/// Checks a file against what it should be, or writes it.
+/// Checks that a file has these bytes, or writes it.
 fn same(name: &str, bytes: &[u8]) {
     let path = folder().join(name);
     if std::env::var_os("STRETCH_WRITE_FIRMWARE").is_some() {
@@ -118,7 +118,8 @@ where
     format!("{:08x}", checksum.0)
 }
 
-/// Returns a calibration that names another estimator than that of its fit, to compute with that one.
+/// Returns the calibration with the name of another estimator. The program then computes with that estimator, although
+/// the calibration was fitted with a different one.
 fn named(calibration: &Calibration, rate_estimator: RateEstimator) -> Calibration {
     let spec = CalibrationSpec { rate_estimator, ..calibration.clone().into_spec() };
     Calibration::new(spec).unwrap()
@@ -130,8 +131,8 @@ fn with(model: Model) -> Calibration {
 
 const REST: RestTracker = RestTracker { level: 1.105, catch_up_s: 0.5, leak: 0.001 };
 
-/// A map of the largest shape that `stretch calibrate` may choose. The cost of a step depends on the shape, hardly on
-/// the numbers.
+/// A map of the largest shape that `stretch calibrate` may choose. The cost of a step depends on the shape, and hardly
+/// on the values of the coefficients.
 fn history(rest: Option<RestTracker>) -> Calibration {
     let (relaxations_s, radii, degree) = ([0.1, 0.4], [0.15], 5);
     let states = 1 + relaxations_s.len() + radii.len();

@@ -1,10 +1,10 @@
 //! Proofs by interval arithmetic that the steps in integers cannot overflow: one proof per calibration, over every code
 //! and every state.
 //!
-//! The step is written once more, over intervals of 128-bit integers, which hold any of its numbers. Each intermediate
-//! result is bounded and compared with the type that the step keeps it in. For an observer the proof is by induction.
-//! The state is bounded, a receptor begins within the bounds, and a step from any such state with any code leads to
-//! such a state again. Finally, results of real steps are checked against the proven bounds.
+//! The step is implemented a second time, over intervals of 128-bit integers, which can hold all of its numbers. Each
+//! intermediate result is bounded and compared with the type that the step keeps it in. For an observer the proof is by
+//! induction. The state is bounded, a receptor begins within the bounds, and a step from any such state with any code
+//! leads to such a state again. Finally, results of real steps are checked against the proven bounds.
 
 use std::ops::{Add, Mul, Shr, Sub};
 

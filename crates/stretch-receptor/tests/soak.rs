@@ -76,8 +76,8 @@ const CLEAN_RATE: f64 = 0.45;
 
 /// Clean samples after which a receptor of this calibration must have forgotten the faults; `None` if it never does.
 ///
-/// A dead band wider than the rate of the motion keeps the branch of the last fault. A baseline falls to a lower level
-/// of rest at once. It returns by its leak alone, over at most twice its furthest shift.
+/// If the dead band is wider than the rate of the clean motion, the branch stays that of the last fault. A baseline
+/// falls quickly to a lower resting level, but rises only by its leak, by up to twice its largest magnitude.
 fn clean_samples(calibration: &Calibration) -> Option<u32> {
     if calibration.spec().dead_band >= CLEAN_RATE * calibration.spec().signal_range.span() {
         return None;
@@ -152,9 +152,9 @@ fn records() -> Vec<(String, Calibration)> {
 /// Largest difference, as a share of the range, between a soaked receptor (one that has processed a long stream with
 /// faults) and a fresh receptor, after both have seen the same clean samples.
 ///
-/// A receptor that remembers a window of samples differs by rounding only, because the window was replaced. Filters
-/// that forget exponentially come as close as rounding lets them. Plays give two states with the same signal, and these
-/// stay apart by the part that the motion never sweeps.
+/// Receptors with a window of samples differ by rounding only, because the whole window was replaced. The differences
+/// of exponential filters decay to rounding errors. Plays can keep two different states under the same signal: the
+/// difference is the part of the play that the motion does not cover.
 fn allowed(calibration: &Calibration, rounding: f64) -> f64 {
     match &calibration.spec().model {
         Model::Linear(_) | Model::Surfaces { .. } => rounding,

@@ -103,8 +103,8 @@ proptest! {
 
     #[test]
     fn a_mirrored_signal_gives_the_same_estimate(stream in stretch_strategies::clean_voltages(120)) {
-        // mirror the signal about its offset and flip every odd power: the same physics,
-        // with a gauge that falls as the muscle contracts
+        // the signal is mirrored about its offset and the odd powers change sign: the same physics with a gauge whose
+        // signal falls as the muscle contracts
         let rising = example_calibration();
         let mut spec = rising.clone().into_spec();
         let about = 2.0 * spec.signal_range.offset();
@@ -149,7 +149,8 @@ fn the_window_fills_before_the_first_reading() {
     assert_eq!(reading.branch, Branch::Inflation);
 }
 
-/// A line, and one curve for both branches, need no rate; after a long gap they answer at once again.
+/// A line, and one curve for both branches, need no rate. Therefore they have an estimate at the first sample after a
+/// long gap.
 #[test]
 fn what_needs_the_signal_only_answers_from_the_first_sample() {
     let mut spec = example_calibration().into_spec();
@@ -233,7 +234,7 @@ fn outside_the_domain_it_clamps_and_says_so() {
     assert_eq!(edge.domain, Domain::Inside);
     assert_eq!(beyond.domain, Domain::SignalClamped);
     assert_eq!(edge.estimate, beyond.estimate);
-    // twelve volts a second is beyond the eight that the surface saw
+    // twelve volts a second is faster than the fitted rates, which end at eight
     receptor.reset();
     let fast = (0..12).map(|n| receptor.step(Volts(1.1 + 0.06 * f64::from(n)))).last().unwrap();
     assert_eq!(fast.unwrap().domain, Domain::Inside);

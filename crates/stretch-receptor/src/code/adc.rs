@@ -88,7 +88,8 @@ impl Adc {
         (self.0.full_scale_v - self.0.zero_v) / f64::from(self.largest())
     }
 
-    /// Returns whether the converter's range is in its own codes, so that a code is the signal itself.
+    /// Returns whether the signal is in counts: the range of the converter is then given in its own codes, and a code
+    /// is the value of the signal.
     pub fn is_in_counts(&self) -> bool {
         (self.volts_per_code() - 1.0).abs() < 1e-9
     }

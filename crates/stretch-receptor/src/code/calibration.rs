@@ -20,9 +20,9 @@ pub const CODE_SCHEMA: u32 = stretch_core::CALIBRATION_SCHEMA;
 /// A [`Calibration`] converted for the codes of one converter, in fixed point, with a Savitzky-Golay rate estimator of
 /// shape `WINDOW`, `DEGREE` and `DELAY`.
 ///
-/// Everything affine (volts per code, both normalisations, the target's unit, the sample rate, the polarity) is folded
-/// into the coefficients. The serialised form (feature `serde`) takes about 100 bytes of a board's flash. It is checked
-/// when it is loaded, and the board does no conversion in floating point.
+/// All affine conversions (volts per code, both normalisations, the target's unit, the sample rate, the polarity) are
+/// multiplied into the coefficients. The serialised form (feature `serde`) takes about 100 bytes of a board's flash. It
+/// is checked when it is loaded, and the board does no conversion in floating point.
 ///
 /// ```
 /// use stretch_receptor::code::{Adc, AdcSpec, FixedCalibration};
@@ -95,7 +95,7 @@ impl<const WINDOW: usize, const DEGREE: usize, const DELAY: usize>
             bits: adc.spec().bits,
             sample_rate: calibration.spec().sample_rate_hz,
             falling: calibration.spec().polarity == Polarity::Falling,
-            // the cast saturates; this loses nothing, because no rate exceeds 32 bits
+            // the cast saturates; this changes no result, because no rate exceeds 32 bits
             dead_band: dead_band as i32,
             surfaces,
         })

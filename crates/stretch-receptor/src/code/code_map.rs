@@ -7,7 +7,8 @@ use crate::Domain;
 /// Number of bits by which a 16-bit sample is shifted left before it is compared with the ends of the domain.
 pub(super) const COARSE_BITS: u32 = 15;
 
-/// Integer ends of a domain, and the factor that scales (spreads) values inside the domain so that they fill 32 bits.
+/// Integer ends of a domain, and the factor by which values inside the domain are multiplied ("spread") to use as many
+/// of 32 bits as possible.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Span {
@@ -76,7 +77,8 @@ impl<S> CodeSurface<S> {
         self.signal.holds() && self.rate.holds()
     }
 
-    /// Returns signal and rate clamped to the domain but not yet spread, and which of them was outside.
+    /// Returns signal and rate, clamped to the domain but not yet multiplied by their factors, and which of them was
+    /// outside.
     #[inline(always)]
     pub(super) fn inputs(&self, sample: u16, rate: i32) -> (i32, i32, Domain) {
         let (volts, signal_outside) = self.signal.clamp(self.coarse(sample));

@@ -58,7 +58,7 @@ pub(super) fn fold(calibration: &Calibration, units: &Units) -> Result<Folded, D
     }
 }
 
-/// Returns the centre code, the domain, and the voltage of 1 in the spread signal.
+/// Returns the centre code, the domain, and the voltage that corresponds to a spread signal of 1 (see `Span`).
 fn signal(domain: Interval, units: &Units) -> (u16, Span, f64) {
     let aligned = |volts: f64| (volts - units.zero_v) / units.step_v;
     let (low, high) = (aligned(domain.min), aligned(domain.max));
@@ -70,7 +70,7 @@ fn signal(domain: Interval, units: &Units) -> (u16, Span, f64) {
     (centre, span, volts)
 }
 
-/// Returns the normalised signal at the centre, and its change per 1 of the spread signal.
+/// Returns the normalised signal at the centre code, and its change if the spread signal changes by 1.
 fn normalised(calibration: &Calibration, centre: u16, volts: f64, units: &Units) -> (f64, f64) {
     let range = calibration.spec().signal_range;
     let centre_v = units.zero_v + f64::from(centre) * units.step_v;
@@ -123,7 +123,7 @@ fn fold_surface(
     Ok(CodeSurface { centre, signal, rate, surface })
 }
 
-/// Returns the cubic `c`, evaluated at `at + per x`, as a cubic in x.
+/// Returns the coefficients of the cubic in x that equals the cubic `c` at the point `at + per x`.
 fn shifted(c: [f64; 4], at: f64, per: f64) -> [f64; 4] {
     let [c0, c1, c2, c3] = c;
     [

@@ -1,11 +1,10 @@
 //! Receptors for boards: converter codes in, estimates out.
 //!
-//! A converter gives integers, and a Savitzky-Golay rate of integers is an integer. No
-//! floating-point number is needed before the surface is evaluated, and for window shapes in common
-//! use nothing is rounded before it. [`FixedReceptor`] handles branch, domain, warm-up and missing
-//! samples like [`StretchReceptor`](crate::StretchReceptor). It evaluates the surface in 32-bit
-//! fixed point, with the estimate in thousandths of the reference's unit: about 100 instructions a
-//! step on any Cortex-M.
+//! A converter gives integers, and a Savitzky-Golay rate of integers is an integer. Therefore all steps before the
+//! surface work without floating-point numbers, and for window shapes in common use they round nothing.
+//! [`FixedReceptor`] handles branch, domain, warm-up and missing samples like
+//! [`StretchReceptor`](crate::StretchReceptor). It evaluates the surface in 32-bit fixed point, with the estimate in
+//! thousandths of the reference's unit: about 100 instructions a step on any Cortex-M.
 //!
 //! [`FixedObserver`] is the integer receptor for the observer, a model with memory.
 //!

@@ -14,7 +14,7 @@ use crate::{Domain, Front, ReceptorError, front::Live, gains::SLOPES};
 
 /// Largest rate: the whole target range in one sample.
 const FASTEST: i32 = 1 << TARGET_BITS;
-/// Target of a memory that has seen no sample. No calibration can have a target as low as this value.
+/// Marks a memory that has seen no sample. No calibration has a target as low as this value.
 const UNBEGUN: i32 = i32::MIN;
 /// Largest magnitude of a relaxation.
 const FURTHEST: i32 = 8 << TARGET_BITS;
@@ -181,7 +181,8 @@ impl IntegerObserver {
         let mut place = usize::from(self.tangents[segment]);
         let (run, change) = ((to - from).abs(), (held - predicted).abs());
         if run > LEAST_RUN {
-            // compares the secant's slope, change/run, with each limit in `ends` without a division
+            // finds the limits in `ends` that the slope of the secant, change/run, exceeds; products are compared,
+            // which needs no division
             let change = i64::from(change) << PLACE_BITS;
             while place < SLOPES - 1
                 && change >= i64::from(self.numbers.ends[place]) * i64::from(run)

@@ -29,9 +29,8 @@ pub struct CodeReading<E> {
 /// [`MAX_BRIDGED`](crate::MAX_BRIDGED) missing samples. There are two differences: a bridged sample stays inside the
 /// converter's range and is rounded to 16 bits of that range, and there is no rate of the estimate.
 ///
-/// No step can overflow, whatever the codes are: codes that the converter does
-/// not have are missing samples, and a [`FixedCalibration`] whose numbers could
-/// leave 32 bits is refused.
+/// No step can overflow, for any codes: a code that the converter does not have counts as a missing sample, and a
+/// [`FixedCalibration`] whose numbers could exceed 32 bits is refused.
 ///
 /// ```
 /// use stretch_core::Runner;
@@ -77,8 +76,8 @@ pub struct CodeMemory<const WINDOW: usize> {
     last_rate: i32,
 }
 
-/// A branch as a number, 0 for inflation and 1 for deflation: an enumeration would
-/// cost a step five instructions more.
+/// A branch as a number, 0 for inflation and 1 for deflation. With an enumeration a step would take five instructions
+/// more.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SideBit(u8);
 

@@ -38,8 +38,9 @@ impl<S> Scaled<S> {
     }
 }
 
-/// Numbers of fraction bits behind the thousandths that are tried. With more bits, the half for rounding would cost
-/// more range than the bits gain in precision. With fewer bits, the factor `2^(32 - bits)` would not fit an `i32`.
+/// Numbers of fraction bits that are tried; they follow the bit with the value of a thousandth. With more bits, adding
+/// a half for rounding would cost more range than the bits gain in precision. With fewer bits, the factor `2^(32 -
+/// bits)` would not fit an `i32`.
 const BITS: core::ops::RangeInclusive<u8> = 2..=16;
 
 impl Scaled<FixedLine> {
@@ -99,7 +100,7 @@ fn fixed_with(folded: &Folded, bits: u8) -> Result<FixedMap, DesignError> {
 /// of their bounds. See
 /// [`FixedCalibration::worst_case_error_um`](super::FixedCalibration::worst_case_error_um).
 pub(super) fn worst_case(surfaces: &FixedMap, rate_rounding: f64) -> f64 {
-    // an end of a domain is rounded to a whole number, which adds up to one to the rate's own rounding
+    // an end of a domain is rounded to an integer, which adds up to one to the rounding error of the rate
     let spread = |factor: i32, rounding: f64| libm::ldexp(rounding * f64::from(factor), -32);
     let signal = |factor: i32| spread(factor, 1.0 + f64::from(1u32 << COARSE_BITS) * SIGNAL_F64);
     let bits =

@@ -134,6 +134,6 @@ fn defects(constants: &mut Constants, has: &mut Vec<&'static str>, defects: &Def
             .define("WORN_REVERSAL", worn.reversal, "turns smaller than this do not count")
             .define("WORN_TRAVELLED", worn.travelled, "distance travelled before");
     }
-    // The delay of a slow amplifier is included in the time shift between signal and reference, so
-    // the live step has no poles for it.
+    // The time shift between signal and reference includes the delay of a slow amplifier. Therefore the live step has
+    // no poles for the amplifier.
 }

@@ -145,12 +145,12 @@ impl RecordingError {
         Self::MissingTime { missing: DataError::missing_column(file, column, present) }
     }
 
-    /// Returns the error of a row that may not be left out for this `reason`.
+    /// Returns the error for a row that may not be left out. `reason` says why.
     pub(crate) fn refused(self, reason: String) -> Self {
         Self::Refused { first: Box::new(self), reason }
     }
 
-    /// Returns the error of a file that cannot be used, `at` the file or a place in it.
+    /// Returns the error for a file that cannot be used. `at` is the file or a place in it.
     pub(crate) fn unusable(at: impl fmt::Display, problem: impl Into<String>) -> Self {
         Self::Unusable { at: at.to_string(), problem: problem.into() }
     }
@@ -202,7 +202,7 @@ impl RecordingError {
         )
     }
 
-    /// Whether one row is at fault, so that a stream may go on with the next.
+    /// Whether the error is about a single row. A reader of a stream can then continue with the next row.
     pub fn is_row(&self) -> bool {
         match self {
             Self::Field { fault, .. } => *fault != FieldFault::DayOrMonth,

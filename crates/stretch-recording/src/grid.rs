@@ -106,8 +106,8 @@ pub(crate) fn joined(
     mut notes: Vec<String>,
     options: &ReadOptions,
 ) -> Result<Recording, RecordingError> {
-    // Each additional clock can shorten the time that all clocks cover. Clocks without a requested column are therefore
-    // left out.
+    // Clocks without a requested column are left out, because each additional clock can shorten the time that all
+    // clocks cover.
     if tracks.len() > 1 && !options.required().is_empty() {
         let is_asked = |c: &Channel| options.required().contains(&c.name);
         let (needed, other): (Vec<_>, Vec<_>) =
@@ -218,8 +218,8 @@ fn has_blanks_between(values: &[f64]) -> bool {
     !BadRows::are_few(blank, between.len())
 }
 
-/// Returns whether values and blanks change places as often as in a column that has a clock of its own: on average, at
-/// least one run of blanks for each ten values.
+/// Returns whether values and blanks alternate as often as in a column with a separate clock: on average, at least one
+/// run of blanks for each ten values.
 fn alternates(values: &[f64]) -> bool {
     let runs = values.windows(2).filter(|pair| pair[0].is_finite() && !pair[1].is_finite()).count();
     runs * 10 >= values.iter().filter(|x| x.is_finite()).count()

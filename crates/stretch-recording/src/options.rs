@@ -6,7 +6,7 @@ use stretch_data::column_meant;
 
 use crate::names::{unit, words};
 
-/// What the numbers of a time column count.
+/// Unit of the numbers in a time column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 pub enum TimeUnit {
     /// Seconds.
@@ -175,8 +175,8 @@ impl ReadOptions {
         self
     }
 
-    /// Takes the time from a column with a usual name in a recording that lacks the column of [`time`](Self::time). The
-    /// unit of [`time_unit`](Self::time_unit) then does not apply.
+    /// If a recording lacks the column of [`time`](Self::time), takes the time from a column with a usual name. The
+    /// unit of [`time_unit`](Self::time_unit) does not apply to that column.
     ///
     /// ```
     /// use stretch_recording::{ReadOptions, Recording, TimeUnit};
@@ -252,9 +252,9 @@ impl ReadOptions {
         self
     }
 
-    /// Returns the sample rate if the time is the sample count, and the words for a note on the source of the rate. The
-    /// option `sample_rate_hz` replaces a time column. Without a time, the rate `stated` above the table applies, then
-    /// `untimed_hz`.
+    /// Returns the sample rate if time is counted in samples, and words for a note that say where the rate comes from.
+    /// The option `sample_rate_hz` replaces a time column. Without a time, the rate `stated` above the table applies,
+    /// then `untimed_hz`.
     pub(crate) fn counted(
         &self,
         has_time: bool,

@@ -30,7 +30,7 @@ pub struct Recording {
     pub notes: Vec<String>,
 }
 
-/// How those notes begin that report a fact about the format and not a guess.
+/// Beginnings of the notes that report a fact about the format. All other notes report a guess or a change.
 const CERTAIN: [&str; 5] = [
     "columns named with their units: ",
     "the time is column ",

@@ -6,7 +6,8 @@ use serde::Serialize;
 
 use crate::options::{DateOrder, ReadOptions, TIME, TimeUnit};
 
-/// The source of a recording's time, as users write it: a column, with a unit or an order of dates behind a colon, or a rate.
+/// The source of a recording's time in the notation of users: a column, optionally with a colon and a unit or an order
+/// of dates, or a rate.
 ///
 /// ```
 /// use stretch_recording::{TimeColumn, TimeUnit};
@@ -52,7 +53,7 @@ impl FromStr for TimeColumn {
     }
 }
 
-/// The text from which the same source is parsed.
+/// Writes the notation of users, from which the same source can be parsed.
 ///
 /// ```
 /// use stretch_recording::TimeColumn;
@@ -77,8 +78,8 @@ impl fmt::Display for TimeColumn {
 }
 
 impl TimeColumn {
-    /// Returns the text for a calibration file: empty for the default, and for a rate, which a calibration file has
-    /// anyway.
+    /// Returns the text for a calibration file. It is empty for the default column, and for a rate, because the
+    /// calibration file contains the sample rate.
     pub fn stored(&self) -> String {
         match self {
             Self::Named(name, None) if name == TIME => String::new(),

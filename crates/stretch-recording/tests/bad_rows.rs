@@ -163,7 +163,8 @@ fn a_share_of_bad_rows_is_left_out_and_a_larger_one_refused() {
     }
 }
 
-/// If no columns are required, a row is bad if nearly all others have a number there. Otherwise the column is text.
+/// If no columns are required, a row without a number in a column is bad if nearly all other rows have one. Otherwise
+/// the column counts as text.
 #[test]
 fn a_column_that_nobody_asks_for_keeps_its_numbers() {
     let lines: Vec<String> = std::iter::once("time_s,force,state,rare".to_owned())

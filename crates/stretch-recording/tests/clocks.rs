@@ -458,7 +458,7 @@ proptest! {
         let rows = (0..samples).map(|i| format!("{},{i}\n", stamp(i)));
         let text: String = std::iter::once("time_s,bridge_v\n".to_owned()).chain(rows).collect();
         let Ok(Recording { trial, notes }) = read_as(&text, &ReadOptions::new()) else {
-            // A recording that is shorter than a few ticks may have no usable clock.
+            // Only a recording of less than a few ticks may be refused, because its clock may not be usable.
             prop_assert!(stamp(samples - 1) - stamp(0) < 2.5 * tick_s);
             return Ok(());
         };

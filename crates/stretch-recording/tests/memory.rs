@@ -77,7 +77,8 @@ fn parquet(count: usize, is_list: bool) -> Vec<u8> {
 #[test]
 fn no_file_takes_more_than_four_times_its_size_and_256_mb() {
     let folder = tempfile::tempdir().unwrap();
-    // Each file is once small enough to be read, and once too large in memory for its size.
+    // For most formats there are two files: one that is read, and one that is refused because it would take too much
+    // memory for its size.
     let text = text();
     let cases = [
         ("text.csv", text.clone(), true),

@@ -21,8 +21,8 @@ const BLOCKS: usize = 32;
 /// Largest number of columns of one array. An array with more columns is left out.
 const MOST_COLUMNS: usize = 64;
 
-/// Longest array that is taken for a date or a time of day instead of a clock, if there is a clock that is
-/// `MUCH_LONGER` times as long.
+/// An array of at most this length is taken for a date or a time of day, and not for a clock, if there is a clock that
+/// is `MUCH_LONGER` times as long.
 const DATE: usize = 3;
 /// Smallest ratio of the length of a clock to the length of an array of `DATE` or fewer values, for which the array is
 /// a date.
@@ -110,8 +110,8 @@ impl Recording {
 
 impl Array {
     /// Returns the number of rows and columns, without dimensions of length 1. Returns `None` if more than two
-    /// dimensions remain. Also returns `None` for an empty array, because next to a dimension of length 0 the others
-    /// can have any length.
+    /// dimensions remain. Also returns `None` for an empty array: if one dimension has length 0, the others can have
+    /// any length.
     fn matrix(&self) -> Option<(usize, usize)> {
         if self.values.is_empty() {
             return None;
@@ -265,7 +265,7 @@ fn candidate(array: &Array, options: &ReadOptions) -> Option<Candidate> {
         false => return None,
     };
     let rank = if is_wanted { Some(0) } else { time_rank(last).map(|rank| rank + 1) };
-    // Some steps back are allowed, because a clock may roll over, repeat its stamps or begin with a stale one.
+    // Some steps back are allowed, because a clock may roll over, repeat stamps or begin with an outdated stamp.
     let back = array.values.windows(2).filter(|t| t[1] < t[0]).count();
     let rises =
         BadRows::are_few(back, samples) && array.values.iter().any(|t| *t != array.values[0]);
@@ -279,8 +279,8 @@ fn candidate(array: &Array, options: &ReadOptions) -> Option<Candidate> {
 /// Decides which of the candidates are clocks.
 fn choose(arrays: &[Array], found: &[Option<Candidate>]) -> Vec<bool> {
     let all = || arrays.iter().zip(found).filter_map(|(a, found)| Some((a, found.as_ref()?)));
-    // A candidate that does not rise is a clock by its name only. It is accepted only if no candidate rises, so that
-    // the error names this array.
+    // A candidate that does not rise has only the name of a clock. It is accepted if no candidate rises; the error then
+    // names this array.
     let one_rises = all().any(|(_, found)| found.rises);
     let longest = all().filter(|(_, c)| c.rises).map(|(a, _)| a.values.len()).max().unwrap_or(0);
     let is_clock = |array: &Array, own: &Candidate| {

@@ -5,8 +5,8 @@ use crate::{
     clock::{Steps, order, spread, unit},
 };
 
-/// Number of stamps at the beginning of a stream from which a coarse clock is recognised. A clock is coarse if the
-/// resolution of its stamps (its tick) is not much shorter than the sample period.
+/// Number of stamps at the beginning of a stream that are examined to recognise a coarse clock. A clock is coarse if
+/// the resolution of its stamps (its tick) is not much shorter than the sample period.
 const LOOKED_AT: usize = 64;
 
 /// The clock of a stream.
@@ -15,12 +15,12 @@ pub(crate) struct LiveClock {
     /// Counts per second, once known. A count is one unit of a recorded time stamp.
     per_second: Option<f64>,
     /// Whether the unit is assumed to be seconds, because neither an option nor the name nor the value of the time
-    /// shows it. The first step then decides.
+    /// gives a unit. The length of the first step then determines the unit.
     is_assumed: bool,
     /// Sample rate, if samples are counted instead of reading a time.
     rate_hz: Option<f64>,
-    /// Expected sample rate, Hz. It gives times to the samples that share the first stamp, shows the unit of the first
-    /// step, and spaces the samples of a coarse clock evenly.
+    /// Expected sample rate, Hz. It determines the times of samples that share the first stamp, the unit of the first
+    /// step, and the even spacing of samples of a coarse clock.
     usual_hz: Option<f64>,
     /// Latest time given to a sample that has the first stamp, in counts.
     first_end: f64,
@@ -165,8 +165,8 @@ impl LiveClock {
         self.coarse.map(|tick| (self.even + period).clamp(stamp, stamp + tick))
     }
 
-    /// Returns the earliest time, in counts, that comes after all samples with the first stamp. The times of those
-    /// samples extend beyond the next stamp if the expected rate is too low.
+    /// Returns the earliest time, in counts, after all samples with the first stamp. If the expected rate is too low,
+    /// the times of those samples extend beyond the next stamp.
     fn after_first(&mut self, tick: f64) -> f64 {
         self.first_end += 1e-6 * tick;
         self.first_end

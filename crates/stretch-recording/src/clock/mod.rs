@@ -21,8 +21,8 @@ use crate::{
 
 /// Smallest time, s, that is taken for seconds since 1970. It is about three years, and no recorder runs that long.
 pub(crate) const EPOCH_S: f64 = 1e8;
-/// Longest step, in sample periods, that does not count as a gap and is accepted where a clock rolls over. Three lost
-/// samples, as many as a live receptor bridges, make a step of four periods.
+/// Longest step, in sample periods, that does not count as a gap and is accepted where a clock rolls over. A live
+/// receptor bridges three lost samples, which is a step of four periods.
 pub(crate) const BRIDGED: f64 = 4.5;
 
 /// A column of time as it was recorded.
@@ -174,8 +174,8 @@ pub(crate) fn note_on_rate(column: Option<&str>, rate_hz: f64, by: &str) -> Stri
     format!("{time}: the time is computed from a rate of {rate_hz} Hz, {by}")
 }
 
-/// Returns the note that time is counted from the first sample, because it was recorded as a time of day or counts from
-/// a distant origin.
+/// Returns the note that time is counted from the first sample, because the recorded time is a time of day or is
+/// counted from a distant origin.
 pub(crate) fn note_on_epoch(first_s: f64) -> String {
     if first_s.abs() < EPOCH_S {
         return "time counts from the first sample".to_owned();

@@ -4,10 +4,10 @@ use crate::clock::{Stamps, Steps};
 
 /// A clock is coarse if at least one stamp in this many repeats.
 const ONE_IN: usize = 20;
-/// A clock without repeated stamps is coarse if at least one step in this many is not the usual number of ticks. Fewer
-/// such steps may be lost samples, even if they are regular.
+/// A clock without repeated stamps is coarse if at least one step in this many differs from the usual number of ticks.
+/// If fewer steps differ, they may be lost samples, even at regular intervals.
 const OTHER_ONE_IN: usize = 5;
-/// Smallest number of steps with an unusual number of ticks from which on a clock is coarse.
+/// A clock is coarse only if at least this number of steps have an unusual number of ticks.
 const FEWEST: usize = 8;
 /// Largest ratio of the median step to the shortest step on a coarse clock.
 const MOST_TICKS: f64 = 3.5;
@@ -154,8 +154,8 @@ fn offsets(part: &[f64], step: f64) -> (f64, f64) {
 }
 
 /// Spreads each run of samples with the same stamp up to the next stamp. Returns the samples for which there is no
-/// time. On a clock that is not coarse, these are repeated stamps for whose samples the time up to the next stamp is
-/// too short at the usual step.
+/// time. On a clock that is not coarse, these are the samples after the first in a run, if the time up to the next
+/// stamp is too short for the run at the usual step.
 fn spread_runs(counts: &mut [f64], steps: Steps, is_coarse: bool) -> Vec<usize> {
     let (mut left_out, mut begin) = (Vec::new(), 0);
     while begin < counts.len() {

@@ -71,13 +71,14 @@ pub(super) fn decide(
     Ok(unit.per_second())
 }
 
-/// Returns the unit that the values show, if it differs from that of the name (seconds if the name has none).
+/// Returns the unit that follows from the values, if it differs from the unit in the name (seconds if the name has no
+/// unit).
 fn by_values(stamps: &Stamps, steps: Steps, named: Option<TimeUnit>) -> Option<TimeUnit> {
     let value = stamps.recorded(stamps.counts.len() / 2);
     let rate_hz = |unit: TimeUnit| unit.per_second() / steps.sample;
     let own = named.unwrap_or(TimeUnit::Seconds);
     let other = if let Some(epoch) = epoch(value).filter(|unit| USUAL_HZ.contains(&rate_hz(*unit)))
-        // The values override a name only if its unit would give a date that no recording has.
+        // The values override the unit in a name only if this unit would give a date that no recording has.
         && (named.is_none() || value / own.per_second() > *SINCE_1970_S.end())
     {
         Some(epoch)
@@ -92,7 +93,7 @@ fn by_values(stamps: &Stamps, steps: Steps, named: Option<TimeUnit>) -> Option<T
     other.filter(|other| *other != own)
 }
 
-/// Returns the unit in which a step fits the expected rate, if it does not fit in seconds.
+/// Returns the unit in which a step agrees with the expected rate, if the step does not agree with it in seconds.
 pub(super) fn by_step(step: f64, usual_hz: f64) -> Option<TimeUnit> {
     let is_near = |unit: TimeUnit| NEAR.contains(&(unit.per_second() / step / usual_hz));
     let others = [

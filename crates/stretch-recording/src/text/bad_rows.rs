@@ -4,9 +4,9 @@ use crate::RecordingError;
 
 /// At most one row in this many may be left out.
 const ONE_IN: usize = 5;
-/// Number of lines below a table that may be a footer. Further lines count as bad rows.
+/// Largest number of lines below a table that count as a footer. Further lines count as bad rows.
 const FOOTER: usize = 16;
-/// Number of bad rows above which reading stops if there are more bad rows than good ones.
+/// If there are more bad rows than good rows, reading stops after this number of bad rows.
 const HOPELESS: usize = 1000;
 /// Largest number of rows that a note lists completely. If there are more, the note lists one less
 /// and counts the others.

@@ -76,7 +76,7 @@ impl Header {
         options: &ReadOptions,
         notes: &mut Vec<String>,
     ) -> Result<(Option<usize>, Option<f64>), RecordingError> {
-        // A name without numbers below it, such as a remark after the last column, is not the time.
+        // A name without numbers below it is not the name of the time. It may be a remark after the last column.
         let time = time_among(&self.names[..self.recorded], options);
         let counted = options.counted(time.is_some(), stated);
         if time.is_none() && counted.is_none() {

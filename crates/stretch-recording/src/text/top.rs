@@ -18,7 +18,7 @@ use crate::{
 
 /// Largest number of lines that are searched for the table.
 const MOST_AHEAD: usize = 256;
-/// Number of rows of numbers below a line of names with a time, after which no other table is searched for.
+/// If a line of names with a time is followed by this number of rows of numbers, no other table is searched for.
 const SURE: usize = 64;
 /// Number of rows of a live stream after which the search for names with a time ends.
 const LIVE_ROWS: usize = 8;
@@ -259,8 +259,8 @@ impl Finder<'_> {
         self.blocks.push(block);
     }
 
-    /// Closes the blocks for which the newest line has other names. That line begins another table, so it is not a bad
-    /// row of theirs.
+    /// Closes every block for which the newest line is a line of new names. That line begins another table, so it does
+    /// not count as a bad row of the block.
     fn close(&mut self) {
         let Some((line, above)) = self.lines.split_last() else { return };
         for block in self.blocks.iter_mut().filter(|block| !block.is_closed) {
@@ -352,7 +352,7 @@ impl Finder<'_> {
                 (lines[names.line].row, names.cells.clone(), names.units.map(|at| &lines[at]))
             }
             (None, None) => match self.options.required() {
-                // Rows of one number are the values of the only required column.
+                // If each row is one number and one column is required, the numbers are the values of that column.
                 [only] if block.cells == 1 => (0, vec![only.clone()], None),
                 _ => return Err(self.no_header(file, &block, is_whole)),
             },

@@ -28,8 +28,8 @@ pub struct ArrayChannel<const N: usize> {
     /// Range of possible samples. Several samples outside in a row mean that the channel is cut off or at the end of its
     /// converter.
     pub possible: Interval,
-    /// Number of repetitions of one value, counted while another channel changes, from which on the channel counts as
-    /// stuck. 0: repetitions are usual and not checked.
+    /// The channel counts as stuck if it repeats one value this number of times while another channel changes. 0 means
+    /// that repetitions are usual and are not checked.
     pub still_samples: u16,
     /// Coefficients that predict the movement of this channel from the movements of the other channels; 0 for itself.
     pub follows: Values<N>,
@@ -64,9 +64,8 @@ pub struct ArrayGains<const N: usize> {
 pub struct ArrayShifts<const N: usize> {
     /// Length of a block, in seconds.
     pub block_s: f64,
-    /// The number from which the limits are derived: the rate of false alarms of all channels together, if all blocks
-    /// were drawn like those of the calibration. It is no statement about other days and movements, whose blocks
-    /// deviate more.
+    /// The rate of false alarms, of all channels together, from which the limits are derived. It holds for blocks from
+    /// the same distribution as those of the calibration. On other days and in other movements blocks deviate more.
     pub false_alarms_an_hour: f64,
     /// Usual mean of each channel's difference, in the reference's unit.
     pub usual: Values<N>,

@@ -70,12 +70,12 @@ impl TryFrom<(Calibration, Option<Turns>)> for GaugeCalibration {
 ///   with `n - 1` degrees of freedom for a share of 0.01. `n` and `v` are corrected for the correlation of neighbouring
 ///   levels. The limit assumes that levels scatter as in the calibration. It does not include a drift.
 /// - With a prior, `limit = scatter max(m_1, ..., m_k)`. Here `m_i` comes from the `i`-th of `k` earlier sessions, in
-///   which the sensor was not put on again: its first half is used as a calibration, and `m_i` is the largest difference
-///   in its second half between two medians of five consecutive levels, or between one of them and the calibration's
-///   level, divided by the calibration's scatter. If a new session is exchangeable with the `k` earlier ones, its own
-///   value exceeds the limit with a probability of at most `1/(k + 1)` (Dunn, Wasserman and Ramdas, J. Am. Stat. Assoc.
-///   2022, arXiv 1809.07441). Nothing is assumed about the drift within a session. The statement holds for a watch as
-///   long as those halves.
+///   which the sensor was not put on again: its first half is used as a calibration, and `m_i` is the largest
+///   difference in its second half between two medians of five consecutive levels, or between one of them and the
+///   calibration's level, divided by the calibration's scatter. If a new session is exchangeable with the `k` earlier
+///   ones, its own value exceeds the limit with a probability of at most `1/(k + 1)` (Dunn, Wasserman and Ramdas, J.
+///   Am. Stat. Assoc. 2022, arXiv 1809.07441). Nothing is assumed about the drift within a session. The statement holds
+///   for recordings that are as long as those halves.
 ///
 /// ```
 /// use stretch_sleeve::Turns;

@@ -24,8 +24,8 @@ pub(crate) struct Set {
 /// relative to its first sample. If no row is zero, the second session begins at the largest jump of all columns
 /// together.
 ///
-/// The gains show that both sessions of a file are from one wearer: they differ a fifth as much as the gains of
-/// different files of the same movement.
+/// The gains show that both sessions of a file are from one wearer: their gains differ by a fifth of the difference
+/// between files of the same movement.
 pub(crate) fn sleeves(folder: &Path) -> anyhow::Result<Set> {
     let mut worn = Vec::new();
     for path in files(folder)? {
@@ -35,8 +35,7 @@ pub(crate) fn sleeves(folder: &Path) -> anyhow::Result<Set> {
         let rows = rows(&path)?;
         let cut = boundary(&rows);
         for (session, rows) in [(first, &rows[..cut]), (second, &rows[cut..])] {
-            // The shortest useful session is a minute from which the reference may be taken, and half a minute that is
-            // judged.
+            // The shortest useful session has one minute whose reference may be used, and half a minute that is judged.
             if rows.len() < 9000 {
                 continue;
             }

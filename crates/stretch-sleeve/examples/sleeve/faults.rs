@@ -12,7 +12,7 @@ use crate::judge::{Judge, first_seconds};
 const AT_S: f64 = 75.0;
 /// Time within which a loss should be found, s.
 const SOON_S: f64 = 0.1;
-/// Share of its range by which a channel must be off before a fault matters.
+/// A fault matters as soon as the channel is off by this share of its range.
 const MATTERS: f64 = 0.02;
 const FAULTS: [&str; 6] =
     ["cut off", "missing", "sticks", "saturates", "slips", "slips by 0.3 of its session's range"];
@@ -22,8 +22,8 @@ const FAULTS: [&str; 6] =
 struct Found {
     cases: usize,
     soon: usize,
-    /// Cases in which the fault matters, and how many of these are found in time from that moment
-    /// on.
+    /// Number of cases in which the fault matters. The next field counts those in which it is found within [`SOON_S`]
+    /// from the moment at which it matters.
     matter: usize,
     soon_once_it_matters: usize,
     another: usize,
@@ -166,7 +166,7 @@ fn rmse(readings: &Readings, trial: &Trial, reference: &str) -> anyhow::Result<f
     Ok((errors.iter().map(|e| e * e).sum::<f64>() / errors.len() as f64).sqrt())
 }
 
-/// Returns the error of the gains without a channel, if that channel is lost from the beginning.
+/// Returns the error of the estimate without a channel, for a channel that is lost from the beginning.
 fn alone_without(
     calibration: &ArrayCalibration<MAX_CHANNELS>,
     trial: &Trial,

@@ -44,15 +44,15 @@ pub(crate) struct Asked {
     pub(crate) leave_sensor: bool,
 }
 
-/// Priors that are learnt without one wearer: one for all channels, if there are several and none is left out, and one
-/// for each channel alone.
+/// Priors that are learnt without the sessions of one wearer: one prior for all channels together (unless there is only
+/// one channel, or a channel is left out), and one for each channel alone.
 pub(crate) struct Priors {
     pub(crate) all: Option<Prior>,
     each: Vec<Prior>,
 }
 
-/// Makes a prior from all sessions except those that are refused, such as those of a sensor whose signal falls where
-/// that of other sessions rises.
+/// Makes a prior from all sessions that the prior accepts. It refuses, for example, a session with a signal that falls
+/// if the signal rises in other sessions.
 fn of_accepted(
     mut sessions: Vec<Session>,
     make: impl Fn(&[Session]) -> Result<Prior, SleeveError>,
@@ -68,7 +68,8 @@ fn of_accepted(
 }
 
 impl Judge {
-    /// Creates the judge, and sums up the sessions for the priors. Refused sessions are printed and left out.
+    /// Creates the judge, and computes the sums of each session for the priors. Refused sessions are printed and left
+    /// out.
     pub(crate) fn new(mut set: Set, used_s: f64, asked: Asked) -> Self {
         let mut sessions = Vec::new();
         let (signals, reference) = (set.signals.clone(), set.reference.clone());

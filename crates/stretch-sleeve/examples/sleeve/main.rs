@@ -81,8 +81,8 @@ fn main() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Prints the geometric means of the errors and of their ratios to two other errors: to that of the line, and to that
-/// of a calibration fitted to the session itself.
+/// Prints geometric means: of the errors, of their ratios to the error of the line, and of their ratios to the error of
+/// a calibration that was fitted to the session itself.
 fn print(title: &str, rows: &[Row]) {
     let Some(first) = rows.first() else { return };
     println!("\n### {title}: {} sessions\n", rows.len());

@@ -16,10 +16,10 @@ use super::{
     prior::LEAST_SESSIONS,
 };
 
-/// Share of pauses across which a zero without a shift is reported as shifted, if levels are independent and normal. A
-/// recording has few pauses, so one false report in a hundred of them is rare. A smaller share would miss more shifts.
+/// Share of the pauses without a shift at which a shift is reported, if levels are independent and normal. A recording
+/// has few pauses, so one false report in a hundred pauses is rare. With a smaller share more shifts would be missed.
 const FALSE_SHARE: f64 = 0.01;
-/// Shortest time without the end of a movement that is a pause, s. A sensor is not put on again in less time.
+/// Shortest time without the end of a movement that counts as a pause, s. Putting a sensor on again takes longer.
 const LEAST_PAUSE_S: f64 = 4.0;
 /// Shortest pause, in median times between the ends of movements, so that a slow movement is not a pause.
 const LEAST_PAUSE: f64 = 4.0;
@@ -102,10 +102,10 @@ fn moves(
 }
 
 /// Returns the largest change of the zero within a session in which the sensor was not put on again, in standard
-/// deviations of levels. The first half of the session is used as a calibration. The change is the largest difference in
-/// the second half between two medians of five consecutive levels, or between one of them and the calibration's level.
-/// A watch of the second half cannot see a larger difference, wherever the session has pauses. Returns `None` if either
-/// half has too few movements.
+/// deviations of levels. The first half of the session is used as a calibration. The change is the largest difference
+/// in the second half between two medians of five consecutive levels, or between one of them and the calibration's
+/// level. A detector that runs over the second half cannot find a larger difference, wherever the pauses are. Returns
+/// `None` if either half has too few movements.
 ///
 /// Signals are multiplied by `sign`, the sign of the polarity.
 pub(crate) fn zero_move(signals: &[&[f64]], sign: f64, rate: SampleRate) -> Option<f64> {
@@ -135,7 +135,7 @@ fn zero_span(levels: &[f64], turns: &Turns) -> Option<f64> {
 }
 
 /// Returns the turning points with the limit of a prior: the largest of the changes of the zero in its sessions
-/// ([`zero_move`]). Without enough sessions the turning points keep their own limit.
+/// ([`zero_move`]). If the prior has too few sessions, the turning points keep the limit from their own calibration.
 pub(crate) fn with_limit_of(turns: Turns, zero_moves: &[f64]) -> Turns {
     if zero_moves.len() < LEAST_SESSIONS {
         return turns;
@@ -148,7 +148,7 @@ pub(crate) fn with_limit_of(turns: Turns, zero_moves: &[f64]) -> Turns {
 /// the sign of the polarity. The field `reference_per_signal` is still zero.
 fn learn(signals: &[&[f64]], sign: f64, rate: SampleRate) -> Option<(Turns, [f64; 2])> {
     let finder = TurnFinder::new(LEAST_SPAN * middle_span(signals)?);
-    // Noise as large as a movement would be mistaken for movements.
+    // Noise of the size of a movement would be taken for movements.
     if finder.least_span <= LEAST_NOISES * noise(signals.iter().copied()) {
         return None;
     }
@@ -216,7 +216,7 @@ fn measure_levels(movements: &[Vec<(f64, f64)>]) -> Option<(Turns, [f64; 2])> {
         least_span: 0.0,
         scatter,
         movements: count as u32,
-        // The medians before and after a pause both scatter.
+        // The factor 2 is needed because the medians before and after a pause both scatter.
         limit: t * scatter * (2.0 * median_variance(alike)).sqrt(),
         pause_s: 0.0,
         sessions: 0,

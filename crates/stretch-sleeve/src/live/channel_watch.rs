@@ -18,12 +18,11 @@ pub fn samples_a_tick(sample_rate_hz: f64) -> u16 {
     (sample_rate_hz / 100.0 + 0.5).clamp(1.0, f64::from(u16::MAX)) as u16
 }
 
-/// Count of recent repetitions of one value. A repetition adds one and another value subtracts one.
-/// At a count of one, another value replaces the old one (the majority vote of Boyer and Moore
-/// 1991).
+/// Count of recent repetitions of one value. A repetition adds one, and a different value subtracts one. If the count
+/// is one, a different value becomes the new value (the majority vote of Boyer and Moore 1991).
 ///
-/// A channel at the end of its converter leaves that value for a sample now and then. A count of
-/// consecutive repetitions would restart each time.
+/// A signal at the end of the converter's range changes for a single sample now and then. A count of consecutive
+/// repetitions would restart each time.
 ///
 /// ```
 /// use stretch_sleeve::Repeats;
@@ -45,8 +44,8 @@ impl<T: Real> Repeats<T> {
         Self { held: T::nan(), count: 0 }
     }
 
-    /// Takes a sample, and returns how many samples in a row had its value: 1 if the value is new.
-    /// `others_change` is whether any channel changed.
+    /// Takes a sample, and returns the count; it is 1 if the value is new. A repetition counts only if `others_change`,
+    /// that is, if any channel changed.
     #[inline(always)]
     pub fn step(&mut self, sample: T, others_change: bool) -> u16 {
         if sample == self.held {

@@ -21,9 +21,9 @@ pub struct ArrayNumbers<T, const N: usize> {
     pub relaxations: usize,
     /// Samples between two comparisons of the channels.
     pub samples_a_tick: u16,
-    /// Samples in a row without a fault after which a lost channel that has not slipped is used again: about ten
-    /// seconds, which is longer than any limit for equal samples, and longer than a usual movement, so that a channel
-    /// that saturates in each movement stays lost.
+    /// Number of consecutive samples without a fault after which a lost channel is used again, unless it slipped: about
+    /// ten seconds. This is longer than any limit for equal samples, and longer than a usual movement. Therefore a
+    /// channel that saturates in each movement stays lost.
     pub samples_to_recover: u32,
     /// Share of the distance to its input that each low-pass covers in a sample.
     pub shares: [T; ARRAY_RELAXATIONS],

@@ -30,9 +30,10 @@ use super::{
 /// 2. The states of each channel are computed, each shifted and scaled into its domain.
 /// 3. The gains for the remaining channels are selected: for all, for all but one, or for the best single channel.
 ///
-/// A missing sample, or one outside the possible range, is replaced by the channel's last one. If the samples of all channels in use are missing, this is a
-/// fault of the recorder and no channel is lost: [`MAX_BRIDGED`] such samples are bridged, and further ones have
-/// no reading. Cost: two products and two sums for each term of a channel in use.
+/// A missing sample, or one outside the possible range, is replaced by the channel's last one. If the samples of all
+/// channels in use are missing, the recorder is at fault and no channel counts as lost: up to [`MAX_BRIDGED`] such
+/// samples are bridged, and there is no reading for further ones. Cost: two products and two sums for each term of a
+/// channel in use.
 ///
 /// ```
 /// use stretch_core::{Runner, Stage};
@@ -196,8 +197,8 @@ impl<T: Real, const N: usize> ArrayReceptor<T, N> {
         &self.0.shares[..self.0.relaxations.min(ARRAY_RELAXATIONS)]
     }
 
-    /// Replaces the samples that are missing in all channels by the last ones. There is no reading after too many of
-    /// them.
+    /// Replaces a sample that is missing in all channels by the last sample of each channel. After too many such
+    /// samples there is no reading.
     fn silence(&self, memory: &mut ArrayMemory<T, N>) -> Result<ArrayReading<T>, ArrayWithheld> {
         // Changes of the channels during this time are not jumps.
         memory.warmed = 0;

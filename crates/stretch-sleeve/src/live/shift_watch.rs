@@ -19,17 +19,15 @@ const VALUES_A_SECOND: f64 = 10.0;
 /// unit, and `r` is the deviation divided by the limit in the calibration
 /// ([`ArrayShifts`](crate::ArrayShifts)).
 ///
-/// If `|r|` of any gauge exceeds 1, some gauge has shifted. A shift of one gauge changes the
-/// differences of all gauges, and that of another gauge may change more relative to its limit. The
-/// shift of gauge `k` changes `r` along a unit vector `m_k` that follows from the gains. Without
-/// this shift, `e_k = max |r - (m_k'r) m_k|` would remain. The gauges with the smallest `e`, and all
-/// gauges with `e` at most 1 or at most twice the smallest one, may have shifted. If there are
-/// several, the data cannot tell which of them has.
+/// If `|r|` of any gauge exceeds 1, a gauge has shifted. It need not be the gauge with the largest `|r|`, because a
+/// shift of one gauge changes the differences of all gauges. A shift of gauge `k` changes the vector of all `r` along a
+/// unit vector `m_k` that follows from the gains. It leaves `e_k = max |r - (m_k'r) m_k|` unexplained. A gauge may have
+/// shifted if its `e` is the smallest, at most 1, or at most twice the smallest. If this holds for several gauges, the
+/// data cannot tell which of them has shifted.
 ///
-/// A gauge that deviates from the first sample of a block on is reported at the end of that block.
-/// A report therefore takes at most two blocks. The signals alone cannot show a zero shift that all
-/// gauges share, nor which of two gauges has shifted. Cost: for each channel, the products of an
-/// estimate, ten times a second.
+/// A gauge that deviates from the first sample of a block on is reported at the end of that block. A report therefore
+/// takes at most two blocks. The signals alone show neither a shift that all gauges share, nor which of only two gauges
+/// has shifted. Cost: for each channel, the products of an estimate, ten times a second.
 ///
 /// ```
 /// use stretch_core::{Design, Stage};
@@ -90,7 +88,7 @@ pub struct Shifts<T, const N: usize> {
 }
 
 impl<T, const N: usize> Shifts<T, N> {
-    /// Returns whether a gauge may have shifted. It has, if this holds for no other gauge.
+    /// Returns whether a gauge may have shifted. If this is true for one gauge only, that gauge has shifted.
     pub fn may_have_shifted(&self, channel: usize) -> bool {
         channel < 16 && self.shifted & (1 << channel) != 0
     }
@@ -206,20 +204,21 @@ impl<T: Real, const N: usize> ShiftWatch<T, N> {
     }
 }
 
-/// Returns for each gauge the unit vector along which its shift changes the deviations divided by
-/// their limits: by the slope of its own estimate, and by minus the slope of the estimates of which
-/// it is a part. A slope is the mean over the domain of the signal.
+/// Returns for each gauge the unit vector along which a shift of this gauge changes the deviations of all gauges, each
+/// divided by its limit. The gauge's own deviation changes by the slope of the estimate from this gauge alone. The
+/// deviation of another gauge changes by minus the slope of the estimate without that other gauge. A slope is the mean
+/// over the domain of the signal.
 fn along<T: Real, const N: usize>(
     calibration: &ArrayCalibration<N>,
     limits: &[f64],
 ) -> [[T; N]; N] {
     let spec = calibration.spec();
-    // The odd powers of the signal alone, without a memory.
+    // Marks the terms that are odd powers of the signal, without memory states.
     let mut is_odd = [false; ARRAY_TERMS];
     let mut powers = [0u8; 1 + ARRAY_TERMS];
     let mut term = 0;
     spec.shape().each_product(|parent, state| {
-        // Products with a memory keep an even number.
+        // A product with a memory state gets the power 0, which is even.
         let power =
             if state == 0 && (parent == 0 || powers[parent] > 0) { 1 + powers[parent] } else { 0 };
         term += 1;

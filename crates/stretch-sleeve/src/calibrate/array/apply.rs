@@ -71,9 +71,9 @@ pub fn apply_array(
 
 /// Evaluates calibrations of several gauges against the reference of each trial.
 ///
-/// The first methods are the calibrations. After them comes each gauge alone: the estimate of a calibration from this
-/// gauge only, even if its samples are impossible. All calibrations must have the same reference. A sample is outside
-/// the domain if a state was clamped.
+/// The first methods are the calibrations. The other methods use a single gauge each: they apply a calibration to this
+/// gauge only, even to samples outside its possible range. All calibrations must have the same reference. A sample is
+/// outside the domain if a state was clamped.
 ///
 /// # Errors
 /// As [`evaluate`](stretch_calibrate::evaluate()).
@@ -129,7 +129,7 @@ pub fn evaluate_arrays(
     evaluate_methods(&named, trials, all)
 }
 
-/// Returns the calibration of one of several gauges. None of its samples is impossible.
+/// Returns the calibration of one of several gauges. It accepts samples of any size.
 fn alone(
     calibration: &ArrayCalibration<MAX_CHANNELS>,
     k: usize,

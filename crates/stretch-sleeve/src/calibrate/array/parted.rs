@@ -60,8 +60,8 @@ pub(crate) fn parted(
     let total: usize = channels.stretches.iter().map(|s| s.len()).sum();
     let count = if trials >= 3 { trials } else { PARTS };
     let gap = if trials >= 3 { 0 } else { (GAP_S * channels.sample_rate.hz()) as usize };
-    // For each part: its first rows, its middle rows and its last rows. The fits without a
-    // neighbouring part exclude the rows at that end.
+    // For each part: its first rows, its middle rows and its last rows. If a neighbouring part is left out of a fit,
+    // the rows at the adjoining end are left out as well.
     let mut sums: Vec<[RowAccumulator; 3]> =
         (0..count).map(|_| [0; 3].map(|_| RowAccumulator::new(terms))).collect();
     let mut rows = vec![0.0; count];

@@ -143,7 +143,7 @@ mod tests {
         let room = |share: f64| 3.0 * (share * (1.0 - share) / 20_000.0).sqrt();
         for blocks in [6, 12, 60] {
             let share = exceeds(blocks, 0.05, 0.0);
-            // A correlation by chance only makes the limits wider.
+            // If independent blocks appear correlated by chance, the limits only become wider.
             assert!(share < 0.05 + room(0.05), "{blocks} blocks: {share}");
             assert!(share > 0.02, "{blocks} blocks: {share}");
         }

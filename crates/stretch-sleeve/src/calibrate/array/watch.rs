@@ -26,9 +26,10 @@ const FAST_STATES: usize = 1;
 const ALARMS_AN_HOUR: f64 = 0.5;
 /// Smallest number of seconds from which a quantile is computed.
 const LEAST_BLOCKS: usize = 20;
-/// Smallest limit for a slip, as a share of a channel's range. It is the limit itself if there are too few seconds.
+/// Smallest limit for a slip, as a share of a channel's range. If the data are too short to compute a limit, this value
+/// is the limit.
 const LEAST_SLIP: f64 = 0.15;
-/// Share of a channel's range by which its samples may leave that range on either side.
+/// Samples may exceed the range of a channel at either end by this share of the range.
 const MARGIN: f64 = 0.5;
 /// Ridge penalty of the regression on the other channels, as a share of their power.
 const RIDGE: f64 = 1e-3;
@@ -120,8 +121,8 @@ fn greatest_of_seconds(channels: &Channels, follows: &[f64], k: usize) -> Vec<f6
     greatest
 }
 
-/// Returns the jump that the largest jump of a second exceeds [`ALARMS_AN_HOUR`] times an hour. The channels share this
-/// rate.
+/// Returns the limit that the largest jump in a second exceeds [`ALARMS_AN_HOUR`] times per hour, over all channels
+/// together.
 fn hourly(greatest: &[f64], channels: usize) -> f64 {
     let n = greatest.len() as f64;
     let mean = greatest.iter().sum::<f64>() / n;
@@ -139,15 +140,15 @@ const STILL_ALARMS_AN_HOUR: f64 = 0.25;
 const LEAST_STILL: f64 = 4.0;
 const MOST_STILL_S: f64 = 1.0;
 
-/// The longest observed runs of equal samples, from which the number of equal samples that indicates a stuck channel is
-/// derived.
+/// The longest observed runs of equal samples. From them follows the number of equal samples that indicates a stuck
+/// channel.
 ///
-/// Samples of a working channel repeat by chance if noise is less than a step of the converter. Of `n` samples, each a
-/// repetition with probability `q`, the longest run of repetitions is about `ln n / ln(1/q)` (Erdos and Renyi 1970;
-/// Schilling, The College Mathematics Journal 21 (1990) 196). A run that occurs once in `m` samples is therefore
-/// `ln m / ln n` times as long as the longest of `n`, which varies by about one. Repetitions count while another
-/// channel changes, because if all channels repeat, the recorder repeats. The count of [`Repeats`] also decreases, and
-/// reaches such a limit about as rarely.
+/// Samples of a working channel repeat by chance if the noise is less than a step of the converter. If each of `n`
+/// samples is a repetition with probability `q`, the longest run of repetitions is about `ln n / ln(1/q)` (Erdos and
+/// Renyi 1970; Schilling, The College Mathematics Journal 21 (1990) 196), and varies by about one. A run that occurs
+/// once in `m` samples is therefore `ln m / ln n` times as long as the longest run in `n` samples. Repetitions count
+/// only while another channel changes; if all channels repeat, the recorder repeats its samples. The count of
+/// [`Repeats`] can also decrease, but it reaches such a limit about as rarely as a run does.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Still {
     /// For each channel the largest number of equal samples in a row, 1 if none repeats.

@@ -14,8 +14,8 @@ use super::{
 const LEAST_COUNT: f64 = 5.0;
 
 /// Errors after some seconds of reference on sessions that were left out of the prior. Each session is judged on the
-/// samples after its first minute. A shorter session is judged on its end (after 30, 20 or 10 s), for durations up to
-/// the beginning of that end. An error that no session shows is `None`.
+/// samples after its first minute. A shorter session is judged on its samples after 30, 20 or 10 s, for durations of
+/// reference up to that time. An error is `None` if no session can be judged.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Expected {
@@ -40,7 +40,7 @@ fn half_width_95(squares: &[f64]) -> Option<f64> {
         let one = |r: &f64| libm::erf(width / (2.0 * r.max(f64::MIN_POSITIVE)).sqrt());
         squares.iter().map(one).sum::<f64>() / count
     };
-    // The worst session alone gives an upper bound.
+    // The half-width for the worst session alone is an upper bound.
     let worst = squares.iter().copied().reduce(f64::max)?.sqrt() * 1.96;
     let (mut low, mut high) = (0.0, worst);
     for _ in 0..60 {
@@ -86,7 +86,8 @@ fn left_out_squares(
     noise: f64,
 ) -> Vec<f64> {
     let one = |(parts, left): (&Vec<Leaf>, &[Option<Normal>; 2])| {
-        // A short session is judged on its end, after at most as many seconds as come before the end.
+        // A short session is judged on its last part that is long enough. It is skipped if the reference extends into
+        // this part.
         let judged = parts.iter().rposition(|part| part.count >= LEAST_COUNT);
         let rest = &parts[judged.filter(|at| *at >= used)?];
         let seen = parts[..used]

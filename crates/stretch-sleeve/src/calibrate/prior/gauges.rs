@@ -11,8 +11,8 @@ use crate::{
 
 use super::learnt::Prior;
 
-/// Gauges count as exchanged or reversed if exchanging or reversing their signals reduces the squared distance of the
-/// signals from those of the prior's sessions to less than this share, that is, halves the distance.
+/// Gauges count as exchanged or reversed if exchanging or reversing their signals reduces the squared distance from the
+/// signals of the prior's sessions to less than this share. The distance is then less than half.
 const NEARER: f64 = 0.25;
 
 /// Mean and covariance of the signals of several gauges.
@@ -70,8 +70,8 @@ impl Moments {
 }
 
 impl Prior {
-    /// Returns the session with all gauges reversed, in two ways: about zero, as exchanged wires do, and about the
-    /// middle of each signal.
+    /// Returns the session with all gauges reversed, in two ways: about zero, the effect of exchanged wires, and about
+    /// the middle of each signal.
     pub(crate) fn mirrored(
         &self,
         trials: &[Trial],
@@ -92,8 +92,8 @@ impl Prior {
         Ok([about(&|_| 0.0)?, about(&|k| ends(k).min + ends(k).max)?])
     }
 
-    /// Returns a description if the gauges resemble those of the sessions only after two are exchanged or one is
-    /// reversed.
+    /// Returns a description of the mistake if the signals resemble those of the prior's sessions only after two gauges
+    /// are exchanged or one is reversed.
     pub(crate) fn misplaced(&self, channels: &Channels) -> Option<String> {
         let prior = Moments::of_prior(self);
         let precision = inverse(&prior.covariance)?;

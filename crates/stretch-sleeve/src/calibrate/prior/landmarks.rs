@@ -52,7 +52,7 @@ pub(crate) fn landmarks(
     ]
 }
 
-/// Returns the share of the samples with the smallest values, at least one sample.
+/// Returns the samples with the smallest values: a share of all samples, at least one.
 fn least(places: &[Place], share: f64, value: impl Fn(&Place) -> f64) -> Vec<Place> {
     let mut valued: Vec<(f64, Place)> = places.iter().map(|p| (value(p), *p)).collect();
     valued.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -24,7 +24,7 @@ use super::{
 
 /// Correlation time of the errors of sleeves, s. Samples within this time count as one.
 const CORRELATED_S: f64 = 1.0;
-/// Smallest absolute correlation whose sign can be trusted.
+/// Smallest absolute correlation at which the sign of the correlation can be trusted.
 pub(crate) const CLEAR: f64 = 0.5;
 /// Smallest number of sessions from which a spread can be learnt.
 pub(crate) const LEAST_SESSIONS: usize = 3;
@@ -157,10 +157,10 @@ impl Prior {
         })
     }
 
-    /// Returns a prior with the same covariances, in which the means for wearers and for the population come from these
-    /// sessions. It serves to add sessions that were recorded after the prior was learnt. The sessions from which it
-    /// was learnt count only if they are given again. The changes of the zero come from these sessions if there are
-    /// enough, otherwise from the earlier ones.
+    /// Returns a prior with the same covariances, whose means for wearers and for the population come from `sessions`.
+    /// Use it to add sessions that were recorded after the prior was learnt. Earlier sessions count only if they are
+    /// given again. The changes of the zero come from `sessions` if there are enough of them, otherwise from the
+    /// earlier sessions.
     ///
     /// # Errors
     /// As [`Prior::learn`].
@@ -278,8 +278,8 @@ fn filled(session: &Session, depth: usize) -> Vec<String> {
     path
 }
 
-/// Removes the levels of the tree that have a separate node for every session, and all levels below, because a
-/// covariance cannot be learnt from them.
+/// Removes the levels of the tree in which every session has a separate node, and all levels below them, because a
+/// covariance cannot be learnt from such levels.
 fn without_single_levels(paths: Vec<Vec<String>>) -> Vec<Vec<String>> {
     let depth = paths.first().map_or(0, Vec::len);
     let distinct = |level: usize| {
@@ -288,7 +288,7 @@ fn without_single_levels(paths: Vec<Vec<String>>) -> Vec<Vec<String>> {
         heads.dedup();
         heads.len()
     };
-    // Below a level with a node for every session there is only the session itself.
+    // Below a level with a separate node for every session, each node contains only this session.
     let keep = (0..depth).take_while(|&level| distinct(level) < paths.len()).count();
     paths.into_iter().map(|path| path[..keep].to_vec()).collect()
 }

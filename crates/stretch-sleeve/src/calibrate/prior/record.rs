@@ -119,7 +119,7 @@ pub(crate) mod triangle {
         packed(own).serialize(to)
     }
 
-    /// Returns an empty matrix if the count of numbers is not that of a triangle.
+    /// Returns an empty matrix if the count of numbers does not match a triangle.
     pub(crate) fn deserialize<'d, D: Deserializer<'d>>(from: D) -> Result<DMatrix<f64>, D::Error> {
         Vec::deserialize(from).map(|own| mirrored(&own))
     }

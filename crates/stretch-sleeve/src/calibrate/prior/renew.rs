@@ -155,8 +155,8 @@ impl Prior {
         let Some(calibration) = earlier else { return Ok((normal, known)) };
         let linear = self.linear(&normal.mean, self.gram.clone(), self.noise);
         let weights = linear.weights_of(calibration).ok_or(SleeveError::OtherPrior)?;
-        // Both the earlier and the new session differ from the mean of their wearer, each with the variance of a
-        // session.
+        // The covariance is twice that of a session, because both the earlier and the new session deviate from the mean
+        // of their wearer.
         let covariance = self.levels.last().map_or(normal.covariance, |level| level * 2.0);
         Ok((Normal { mean: DVector::from_vec(weights), covariance }, known))
     }

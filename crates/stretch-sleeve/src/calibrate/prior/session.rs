@@ -284,7 +284,7 @@ mod tests {
         let wider = wider.map(|d| Interval { min: 1.5 * d.min - 0.3, max: 2.0 * d.max + 0.1 });
         let bank = Bank::new(vec![wider.collect()]);
         let weights = DVector::from_fn(bank.terms(), |k, _| 0.3 * (k as f64).cos());
-        // The sum of squared residuals shows for any weights whether the rows are those over the wider domains.
+        // If the rows are those over the wider domains, the sum of squared residuals agrees for any weights.
         let channels = Channels::new(&[trial], &["s1".into()], "angle_deg").unwrap();
         let (mut row, mut scratch, mut want) = (Vec::new(), (Vec::new(), Vec::new()), 0.0);
         let stretch = &channels.stretches[0];

@@ -10,7 +10,7 @@ use crate::{
 
 const HZ: f64 = 50.0;
 
-/// A session of one wearer whose movement looks the same if all signals are reversed.
+/// A session of one wearer with a symmetric movement: it looks the same if all signals are reversed.
 fn session(wearer: usize, number: usize, seconds: f64) -> Trial {
     let swings = |t: f64, phase: f64| {
         45.0 + 30.0 * (1.3 * t + phase).sin() + 10.0 * (0.37 * t * t.sqrt()).sin()
@@ -24,8 +24,7 @@ fn resting(wearer: usize, number: usize, seconds: f64) -> Trial {
     gauged(wearer, number, seconds, rests)
 }
 
-/// Two gauges with a gain and a zero, of which the first also has a memory of 0.3 s, on an angle
-/// `moves(time, phase)`.
+/// Two gauges with a gain and a zero on an angle `moves(time, phase)`. The first gauge also has a memory of 0.3 s.
 fn gauged(wearer: usize, number: usize, seconds: f64, moves: impl Fn(f64, f64) -> f64) -> Trial {
     let gain = 1.0 + 0.2 * (wearer as f64 * 2.3).sin() + 0.02 * number as f64;
     let zero = 0.1 * (wearer as f64 * 1.7).cos() + 0.01 * number as f64;

@@ -16,8 +16,8 @@ use crate::calibrate::linear::{inverse, symmetric};
 
 use super::record::{list, triangle};
 
-/// Weight of the prior of a covariance (its own diagonal), as a number of nodes per term. Few nodes per term would not
-/// determine the covariance without this prior.
+/// Weight of the prior of a covariance (its own diagonal), as a number of nodes per term. If there are few nodes per
+/// term, the covariance is not determined without this prior.
 const SHRINKAGE: f64 = 0.3;
 /// Variance of each coefficient at the start, and the smallest variance, in normalised target.
 const FIRST: f64 = 0.05;
@@ -257,8 +257,8 @@ impl<'a> Tree<'a> {
         Some([(Vec::new(), passed.root_posterior)].into_iter().chain(inner).map(known).collect())
     }
 
-    /// Returns the tree's predictions for each session without that session: one with the rest of its path known, and
-    /// one without the whole branch below the root. A prediction is `None` if nothing is left.
+    /// Returns two predictions for each session. The first leaves out only this session; the second leaves out the
+    /// whole branch of the session below the root. A prediction is `None` if no session remains.
     pub(crate) fn left_out(&self, spread: &Spread) -> Option<Vec<[Option<Normal>; 2]>> {
         let passed = self.pass(spread)?;
         let mut answers = vec![[None, None]; self.leaves.len()];

@@ -27,7 +27,8 @@ use super::{
 /// Smallest range of a movement, as a share of the prior's range of the reference.
 pub(crate) const MOVEMENT: f64 = 0.2;
 
-/// Data of an updated calibration, and the errors of left-out sessions of the prior after as many seconds of reference.
+/// Facts about an updated calibration, and the errors of the prior's left-out sessions with the same duration of
+/// reference.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct UpdateSummary {
     /// Duration of the reference that was used, s.
@@ -41,8 +42,9 @@ pub struct UpdateSummary {
     pub half_width_95: Option<f64>,
 }
 
-/// Returns `X'X/n` for a future session, from that of the prior and that of some seconds of the session. Each row of
-/// `X` contains the terms of a sample. One minute of the session has the same weight as the prior.
+/// Returns `X'X/n` for the rest of a session: the weighted mean of `prior`, the matrix of the prior, and `own`, the
+/// matrix of the first seconds of the session. Each row of `X` contains the terms of a sample. One minute of the
+/// session has the same weight as the prior.
 fn mixed_gram(prior: &DMatrix<f64>, own: &DMatrix<f64>, seconds: f64) -> DMatrix<f64> {
     let weight = seconds / 60.0;
     (prior + own * weight) / (1.0 + weight)
@@ -316,7 +318,7 @@ impl Prior {
         })
     }
 
-    /// Returns a note on the prior's knowledge of a path.
+    /// Returns a note that says how much of a path the prior knows.
     pub(crate) fn whom(&self, path: &[String], known: usize) -> Option<String> {
         if path.is_empty() || known == path.len() {
             return None;

@@ -34,7 +34,7 @@ fn file(names: &[&str]) -> Vec<u8> {
     let mut text = Vec::new();
     let trial = Trial { name: "bench".to_owned(), time_s, channels };
     trial.write_to(&mut text).expect("memory takes everything");
-    // Rounding removes tails such as 0.30000000000000004, which a recorder does not print.
+    // Times are rounded, because a recorder does not print digits such as those of 0.30000000000000004.
     let fields = String::from_utf8(text).expect("text");
     fields.lines().map(|line| shorten(line) + "\n").collect::<String>().into_bytes()
 }

@@ -1,9 +1,9 @@
 //! One step of a Savitzky-Golay rate (11 taps) and of a biquad, per sample,
 //! and one step of `sci-rs`, `biquad` and `idsp` in the same run.
 //!
-//! Before the timing, the results of all candidates are checked for agreement. The ratios that are
-//! printed first come from alternating rounds, so that a busy machine slows all candidates equally.
-//! Criterion's own figures follow.
+//! Before the timing, the results of all candidates are checked for agreement. The ratios that are printed first come
+//! from alternating rounds. Other load on the machine then slows all candidates equally. Criterion's own figures
+//! follow.
 
 use std::{
     hint::black_box,
@@ -249,7 +249,7 @@ fn filters(criterion: &mut Criterion) {
 
     let mut candidates = derivatives();
     let y = outputs(&mut candidates, &x);
-    // The live output equals the centred one five samples later.
+    // The live output is that of the centred filter, delayed by five samples.
     assert!(differ(&y[1], &y[4], 5) < 1e-10 && differ(&y[4], &y[7], 0) < 1e-10);
     assert!(differ(&y[0], &y[5], 0) < 1e-10 && differ(&y[0], &y[6], 0) < 1e-10);
     assert!(differ(&y[0], &y[3], 0) == 0.0);

@@ -1,5 +1,5 @@
-//! The live step of a receptor, compared with a hand-written kernel that does only the same
-//! arithmetic and serves as a lower limit.
+//! The live step of a receptor, compared with a hand-written kernel that does nothing but the arithmetic. The time of
+//! the kernel is a lower limit.
 //!
 //! One step: normalise, causal 11-point Savitzky-Golay rate, branch, poly13, denormalise. The
 //! kernel uses a transposed filter, evaluates both surfaces and selects one. It has no domain

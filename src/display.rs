@@ -1,9 +1,9 @@
 //! Output of the program: texts on standard output and standard error, the width of lines, and
 //! colours.
 //!
-//! A closed or full stream never stops the work. Failed writes to standard error are ignored.
-//! Standard output may be the requested result, so its first failure is stored. The command then
-//! still writes its files, and [`lost`] reports the failure at the end of the program.
+//! A closed or full stream never stops the work. Failed writes to standard error are ignored. A failed write to
+//! standard output may lose the requested result, so the first failure is stored. The command still writes its files,
+//! and [`lost`] reports the failure at the end of the program.
 
 use std::{
     env,
@@ -37,7 +37,7 @@ pub(crate) enum Volume {
     Verbose,
 }
 
-/// Start time of the program, and its volume.
+/// Start time of the program, and how much it prints.
 static BEGUN: OnceLock<(Instant, Volume)> = OnceLock::new();
 
 /// Sets the start time and the volume, once.
@@ -116,7 +116,7 @@ pub(crate) fn say_below<'a>(
     let written: Vec<String> =
         written.into_iter().map(|path| format!("wrote {}", path.display())).collect();
     let lines = |text: &str| wrapped(&plain(text)).lines().count();
-    // One line says what -v adds.
+    // One line is reserved for the hint that -v prints more.
     let last: usize = 1 + written.iter().map(|text| lines(text)).sum::<usize>();
     let mut room = if is_verbose() { usize::MAX } else { MOST_LINES.saturating_sub(last) };
     let mut left_out = 0;

@@ -1,8 +1,7 @@
 //! The program `stretch`: parses its arguments and runs a command. This crate is not meant as a
 //! library; use the crates on which it is built.
 
-// These macros panic if the reader of the stream has closed it. Use the functions of `display`
-// instead.
+// `print!` and `eprint!` panic if the reader of the stream has closed it. Use the functions of `display` instead.
 #![warn(clippy::print_stdout, clippy::print_stderr)]
 
 mod commands;
@@ -156,7 +155,7 @@ pub fn run() -> ExitCode {
         Command::Page(args) => page::run(args),
     });
     display::detail("the end");
-    // If the reader of standard output has closed it, as `head` does, this is no error.
+    // It is not an error if the reader of standard output has closed it, as `head` does.
     let is_unread = display::lost() == Some(ErrorKind::BrokenPipe);
     match (result, display::lost()) {
         (Err(error), _) if is_unread && is_broken_pipe(&error) => ExitCode::SUCCESS,

@@ -60,8 +60,8 @@ const OPTIONS: [(&str, &str); 21] = [
     ("--time-unit", "write --time COL:UNIT, such as --time stamp:us"),
 ];
 
-/// Renamed options and their new names, so that old scripts still work. The value of the option stands between the two
-/// texts.
+/// Renamed options and their new spelling, because old scripts still use them. The value of the option is inserted
+/// between the two texts.
 const RENAMED: [(&str, [&str; 2]); 4] = [
     ("--json-out", ["--json=", ""]),
     ("--preset", ["--rig=", ""]),
@@ -89,7 +89,7 @@ pub(crate) fn with_todays_names(mut arguments: impl Iterator<Item = OsString>) -
     renamed
 }
 
-/// Returns a sentence on the replacement of a removed command or option, if the error is about one.
+/// If the error is about a removed command or option, returns a sentence on its replacement.
 pub(crate) fn instead(error: &clap::Error) -> Option<String> {
     let (kind, table) = match error.kind() {
         ErrorKind::InvalidSubcommand => (ContextKind::InvalidSubcommand, &COMMANDS[..]),

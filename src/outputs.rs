@@ -44,9 +44,9 @@ fn named(command: &Command, matches: &ArgMatches, found: &mut Vec<Output>) {
             path: path.clone(),
             example: example.clone(),
             replaces_recordings: match command.get_name() {
-                // Estimates have words in their rows and are not mistaken for a recording.
+                // Rows of estimates contain words, so an earlier output is not mistaken for a recording.
                 "apply" => false,
-                // A file name after the output may come from a shell that expanded --out *.csv.
+                // If a file name follows the output on the command line, a shell may have expanded --out *.csv.
                 "convert" => !is_at(command, matches, place + 1),
                 _ => true,
             },
@@ -68,8 +68,8 @@ fn is_at(command: &Command, matches: &ArgMatches, place: usize) -> bool {
 /// Guards the inputs of a command against being overwritten by its outputs.
 ///
 /// # Errors
-/// Two outputs that are the same file; an output that would replace a recording. A shell turns
-/// `--out r*.csv` into the names of existing recordings, of which the first becomes the output.
+/// Two outputs that are the same file; an output that would replace a recording. For example, a shell expands `--out
+/// r*.csv` to the names of existing recordings, and the first name becomes the output.
 pub(crate) fn guard(command: &Command, matches: &ArgMatches) -> anyhow::Result<()> {
     let mut outputs = Vec::new();
     named(command, matches, &mut outputs);
@@ -117,7 +117,8 @@ mod tests {
         command.get_subcommands().for_each(|command| paths(command, found));
     }
 
-    /// `convert` replaces its own output. It replaces no recording whose name a shell may have inserted.
+    /// `convert` replaces its own earlier output, but not a recording whose name may come from the expansion of a
+    /// pattern by the shell.
     #[test]
     fn a_converted_recording_is_replaced_by_the_same_command() {
         let folder = tempfile::tempdir().expect("a folder");

@@ -6,8 +6,8 @@ pub(crate) use stretch_report::number;
 
 use crate::display::columns;
 
-/// Longest cell, in characters, that is not broken, if it needs at most a third of the line. Such
-/// cells are numbers, intervals or names.
+/// A cell of up to this number of characters is not broken if it needs at most a third of the line. Such cells are
+/// numbers, intervals or names.
 const WHOLE: usize = 24;
 /// Characters between two cells.
 const AROUND: usize = 3;

@@ -38,7 +38,7 @@ impl Simulated {
     }
 }
 
-/// A fault of a log in use that was not present at calibration.
+/// A fault of a log to which a calibration is applied. The calibration was fitted without the fault.
 #[derive(Clone, Copy)]
 pub(crate) enum Fault {
     /// White noise, relative to the signal's range.
@@ -68,7 +68,7 @@ impl Fault {
                 }
             }
             Self::Jitter(seconds) => {
-                // The sample is taken late or early, while its stamp shows the nominal time.
+                // The sample is taken late or early, but its stamp shows the nominal time.
                 let times = &trial.time_s;
                 let moved: Vec<f64> = times
                     .iter()

@@ -5,12 +5,12 @@
 //! cargo run --release --example accuracy -- --write   # and renews reference/accuracy/*.csv
 //! ```
 //!
-//! The seeds are fixed and arbitrary. `--development` uses the seeds on which the models were
-//! designed, and writes nothing.
+//! The seeds are arbitrary and were fixed beforehand. `--development` uses the seeds on which the models were designed,
+//! and writes no files.
 //!
-//! `--data DIR` or `STRETCH_DATA` names the folder with `knit_sleeve` (default `../shared/data` next
-//! to the workspace). Without it the tables of measured sessions are left out. Names of parts
-//! (why, candidates, effects, robust, measured, coverage) or of effects select these.
+//! `--data DIR` or `STRETCH_DATA` names the folder with `knit_sleeve` (default `../shared/data` next to the workspace).
+//! Without it the tables of measured sessions are left out. To compute only some tables, name parts (why, candidates,
+//! effects, robust, measured, coverage) or effects.
 //!
 //! All errors are root mean squares on trials that were never fitted. Intervals
 //! come from a block bootstrap over half-second blocks.

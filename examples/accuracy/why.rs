@@ -1,4 +1,4 @@
-//! Why the published method fails on arbitrary actuation: each cause is removed separately.
+//! Tests why the published method fails on arbitrary actuation: each possible cause is removed separately.
 
 use std::path::Path;
 
@@ -25,7 +25,7 @@ pub(crate) fn tables(data: &Path, seeds: &[u64]) -> anyhow::Result<Vec<ResultTab
     Ok(tables)
 }
 
-/// A part of each estimate's error that is removed afterwards.
+/// A part of the error of the estimates that is removed after they were computed.
 #[derive(Clone, Copy)]
 enum After {
     /// The best constant delay of each trial.

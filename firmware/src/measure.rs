@@ -42,9 +42,9 @@ pub fn length_only(answer: Result<Reading<f32>, Withheld>) -> Answer<f32> {
 
 /// Replays every sample through `step`, a function that is not inlined, and prints one line.
 ///
-/// `input` makes the sample, and `answer` converts the result to an answer; neither is counted. The
-/// count covers the code between two readings of the counter, without the readings themselves:
-/// passing the arguments, the call, the step, and the return.
+/// `input` makes the sample, and `answer` converts the result to an answer; the instructions of both are not counted.
+/// Counted are passing the arguments, the call, the step, and the return: the code between two readings of the counter,
+/// without the readings themselves.
 #[inline(never)]
 pub fn replay<D, M: ?Sized, I, R, E: Length>(
     model: &str,

@@ -20,7 +20,7 @@ pub fn paint() -> usize {
     sp
 }
 
-/// Returns the number of bytes below `sp` from the deepest one that was written since [`paint`].
+/// Returns the depth of the stack: the distance from `sp` down to the deepest byte that was written since [`paint`].
 pub fn depth(sp: usize) -> usize {
     let mut at = sp - DEPTH;
     // SAFETY: as above, read only.

@@ -134,7 +134,7 @@ fn report(gauge: &GaugeCalibration, trial: &Trial, found: &AppliedGauge) {
     let (seen, doubts) = applied.seen(calibration, trial);
     summarise(&seen, applied.faults);
     doubts.iter().for_each(doubt);
-    // The zero of another signal is no shift.
+    // If the signal is not that of the calibrated sensor, its zero does not show a shift.
     if seen.doubt().is_some_and(|doubt| doubt.explains_others()) {
         return;
     }
@@ -166,7 +166,7 @@ fn live(
     let calibration = gauge.calibration();
     let mut input = BufReader::new(input);
     if !Recording::is_text(input.fill_buf()?) {
-        // Binary rows and arrays can only be read as a whole.
+        // Other formats than text can only be read as a whole.
         let trial = with_notes_printed(Recording::from_reader(input, "standard input", options)?);
         let found = apply_gauge(gauge, &trial, follow)?;
         found.applied.write_csv(calibration, &trial, out)?;
@@ -248,8 +248,8 @@ impl ZeroWatch {
         }
     }
 
-    /// Passes the zero that was determined at the end of a movement, at `time_s`, to `take`. If the signal is doubted,
-    /// reports the doubt instead, once, because another signal does not show whether the zero has shifted.
+    /// Takes the zero that was determined at the end of a movement, at `time_s`. If there is a doubt about the signal,
+    /// reports this doubt once instead, because the zero then does not show a shift.
     fn take_unless(&mut self, found: Option<Doubt>, time_s: f64, zero: &Zero<f64>) {
         let Some(found) = found else { return self.take(time_s, zero) };
         if !std::mem::replace(&mut self.has_doubt, true) {
@@ -257,8 +257,8 @@ impl ZeroWatch {
         }
     }
 
-    /// Stores the zero that was determined at the end of a movement, at `time_s`. Warns if it has shifted and the zero
-    /// stored before had not.
+    /// Stores the zero that was determined at the end of a movement, at `time_s`. Warns if this zero has shifted and
+    /// the previously stored zero had not.
     fn take(&mut self, time_s: f64, zero: &Zero<f64>) {
         if let Some(turns) = self.turns.filter(|_| zero.has_shifted && !self.shifted) {
             let basis = match turns.sessions {
@@ -281,11 +281,11 @@ impl ZeroWatch {
         self.last = Some(*zero);
     }
 
-    /// Reports at the end how far the zero was followed, or with `-v` that the calibration cannot
-    /// detect shifts, which `stretch calibrate` has said with the reason.
+    /// Reports at the end how far the zero was followed. With `-v`, also reports that the calibration cannot detect
+    /// shifts; `stretch calibrate` has given the reason.
     fn end(&self) {
         let Some(turns) = self.turns else {
-            // A calibration that needs only the signal, such as that of a load cell, may lack
+            // The calibration of a load cell, for example, needs only the signal, and its trials may contain no
             // movements.
             if !self.needs_signal_only {
                 detail(

@@ -44,7 +44,8 @@ pub(super) fn require_gauges(
     channels.fold(options, |all, channel| all.require_with_gaps(channel.signal.as_str()))
 }
 
-/// Prints how many samples have an estimate, and of what quality.
+/// Prints how many samples have no estimate, how many are outside the calibrated domain, and how many have a lost
+/// gauge.
 fn report(applied: &AppliedArray) {
     let count = |is_one: &dyn Fn(&ArrayReading<f64>) -> bool| {
         applied.readings.iter().flatten().filter(|reading| is_one(reading)).count() as u64
@@ -89,15 +90,16 @@ pub(super) fn warnings<'a>(
     losses.chain(shifts(calibration, &trial.name, applied))
 }
 
-/// Returns a sentence if a gauge begins to deviate from the other gauges and goes on to do so.
+/// Returns a sentence if a gauge deviates from the other gauges from some block on.
 fn shifts(
     calibration: &ArrayCalibration<MAX_CHANNELS>,
     trial: &str,
     applied: &AppliedArray,
 ) -> Option<String> {
     let unit = unit(calibration.spec().reference.as_str()).unwrap_or_default();
-    // A gauge that was put on again stays shifted, whereas the memory of a sensor after a long hold fades. A shift therefore
-    // counts from the first block after which most of the blocks show one, and names the gauges that all of these name.
+    // A gauge that was put on again stays shifted, whereas the memory of a sensor fades after a long rest. Therefore a
+    // shift counts from the first block from which on most blocks show a shift. The sentence names the gauges that all
+    // of these blocks have in common.
     let is_shifted = |(_, shifts): &&(f64, Shifts<f64, MAX_CHANNELS>)| shifts.shifted != 0;
     let (mut shifted, mut first) = (0, None);
     for (at, block) in applied.shifts.iter().enumerate().rev() {

@@ -141,8 +141,8 @@ pub(crate) struct Args {
     pub(super) json: Json,
 }
 
-/// Options that are handled by `calibrate_sleeve`. They exclude options that apply only to one
-/// gauge without a prior.
+/// Options that `calibrate_sleeve` handles. They cannot be combined with options that apply only to one gauge without a
+/// prior.
 const SLEEVE: [&str; 2] = ["prior", "session"];
 
 /// Columns of signals, as selected with `--signal`.
@@ -262,7 +262,7 @@ impl Args {
                 _ => String::new(),
             },
             reference: self.reference.clone(),
-            // Ranking signals and choosing a model start from the published model.
+            // `--signal auto` and `--model auto` begin with the published model.
             model: match self.model() {
                 Model::Auto => base.model,
                 Model::One(kind) => kind,
@@ -356,8 +356,8 @@ fn read_causes(path: &Path, trials: &[PathBuf]) -> anyhow::Result<Causes> {
     let of = data_set.as_ref().map_or(String::new(), |set| format!(", a diagnosis of {set}"));
     let mut notes =
         vec![format!("the model uses the effects of {}{of}: {}", name(), diagnosis.sentence)];
-    // The diagnosis of another rig of the same type may apply, so this is permitted, but a note
-    // names both data sets.
+    // The diagnosis of another rig is permitted, because it may apply to rigs of the same type. A note names both data
+    // sets.
     if let ([own], Some(set)) = (trials, &data_set)
         && name_of(own) != *set
     {
@@ -394,7 +394,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let (trials, is_table) = args.read(&mut columns)?;
     options = options.named_as(&trials);
     options.is_table = is_table;
-    // Outliers are removed only from the named columns, because candidate signals may be anything.
+    // Outliers are removed only from columns that the user names, because a candidate column may hold any quantity.
     // Rows of a table may be far apart, so nothing is removed from tables.
     let named = [options.reference.clone(), options.signal.clone()];
     let named = [named[0].as_str(), named[1].as_str()];
@@ -497,8 +497,7 @@ fn rank(
     Ok(ranking)
 }
 
-/// Accepts a fit that explains something, with a note if that is little. With `--force`, accepts any
-/// fit.
+/// Accepts a fit unless it explains nothing, and adds a note if it explains little. With `--force`, accepts any fit.
 fn accept(calibrated: &mut Calibrated, args: &Args) -> anyhow::Result<()> {
     match explains_nothing(&calibrated.fits) {
         Some(why) if args.force => {
@@ -513,7 +512,7 @@ fn accept(calibrated: &mut Calibrated, args: &Args) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Chooses a model, and shows on a terminal how many have been judged.
+/// Chooses a model. On a terminal, shows how many models have been cross-validated.
 fn choose(trials: &[Trial], options: &Options) -> Result<ModelChoice, CalibrateError> {
     let bar = spinner();
     let show =
@@ -528,7 +527,7 @@ fn straight_line(trials: &[Trial], options: &Options) -> Result<Calibrated, Cali
     calibrate(trials, &Options { model: ModelKind::Linear, ..options.clone() })
 }
 
-/// Ratio of the error of a model to that of a straight line from which a note is given.
+/// A note is given if the error of a model is more than this multiple of the error of a straight line.
 const WORSE: f64 = 1.05;
 
 /// Returns a note if a straight line through the fitted trials has a smaller error than the calibration.

@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args) -> anyhow::Result<()> {
             )
         }
     };
-    // The update itself requires the prior's signals, so only named signals are required here.
+    // The columns that the user names are required here. The update later requires the signals of the prior.
     let asked = references.iter().chain(named.iter().filter(|_| args.names_signals()));
     let columns = asked.fold(args.recorded.options(), |columns, name| columns.require(name));
     let columns = if named.is_empty() { columns.all_columns() } else { columns };
@@ -158,8 +158,8 @@ fn stage_reports(
     made.iter().map(stage).collect()
 }
 
-/// Returns the report of a calibration: all gauges together, and each gauge with a separate straight line. A gauge to
-/// which no line can be fitted has no part.
+/// Returns the report of a calibration: a section for all gauges together, and one for a straight line through the
+/// signal of each gauge. A gauge to which no line can be fitted has no section.
 fn report(
     made: &Made,
     trials: &[Trial],

@@ -69,7 +69,7 @@ fn exports_to_c(model: &str) -> bool {
     !matches!(kind, Ok(ModelKind::Remembering { kind: Memory::History, .. }))
 }
 
-/// Returns a sentence for a chosen model that has no C code, with the best one that has.
+/// If the chosen model has no C code, returns a sentence that names the best model with C code.
 fn on_this_computer(choice: &ModelChoice, reference: &str) -> Option<String> {
     let chosen = choice.model.to_string();
     if exports_to_c(&chosen) {
@@ -120,7 +120,7 @@ fn table_of_models(rows: &[&ModelRow], chosen: &str) -> String {
     ];
     let rows: Vec<Vec<String>> = rows.iter().map(row).collect();
     let has_values = |i: &usize| rows.iter().any(|row| row.get(*i).is_some_and(|cell| cell != "-"));
-    // with trials of one kind only, the column of that kind repeats the first one
+    // if all trials are of one kind, the column of that kind repeats the first column
     let is_kind = |i: &usize| KINDS.contains(&header[*i]);
     let has_kinds = (0..header.len()).filter(|i| is_kind(i) && has_values(i)).count() > 1;
     let is_shown = |i: &usize| {

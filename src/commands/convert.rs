@@ -1,4 +1,4 @@
-//! `stretch convert`: converts a foreign log to the format of the other commands.
+//! `stretch convert`: converts a log in any format to the format of the other commands.
 
 use std::path::PathBuf;
 
@@ -110,7 +110,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     log.time_s.iter_mut().for_each(|t| *t = tidy_time(*t - start_s, largest_s));
     let trial = Trial { channels, ..log };
     trial.write(&args.out).context("nothing was written")?;
-    // Without --column, no channel is left here.
+    // Without --column, the list of channels is empty here.
     let is_left_out = |channel: &&Channel| args.columns.iter().all(|c| c.old != channel.name);
     let left_out = log.channels.iter().filter(is_left_out);
     let left_out: Vec<_> = left_out.map(|channel| channel.name.as_str()).collect();

@@ -262,7 +262,7 @@ impl Calibrations {
         let ramps = sessions.ramps();
         let linear = calibrate(&ramps, &Options { model: ModelKind::Linear, ..options.clone() })?;
         let surfaces = calibrate(&ramps, options)?;
-        // The same candidates as those of stretch calibrate --model auto.
+        // `stretch calibrate --model auto` compares the same candidates.
         bar.set_message("diagnosing the gauge");
         let show = |text: &str| bar.set_message(text.to_owned());
         let causes = Causes::of(fit, options, &show, &|| false).without_missing_pressure(fit);

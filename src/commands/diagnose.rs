@@ -24,7 +24,7 @@ use super::{
 };
 use crate::display::{fail, is_quiet, is_verbose, warn};
 
-/// End of the message if there are competing explanations but no recommended experiment.
+/// End of the message if several explanations remain but no experiment is recommended.
 const NO_PREDICTION: &str = " that the simulator can predict: it accepts no altered inputs, or its budget of runs is used up";
 /// Exit status if the verdict is listed in `--fail-on`.
 const FAILED_ON: u8 = 3;
@@ -163,7 +163,7 @@ impl FailOn {
             Self::Record => verdict == Record,
             Self::Faint => is_faint,
             Self::Parameters => verdict == Parameters,
-            // A fault that hides a gap is no agreement.
+            // A fault of the recording may hide a gap, so the result does not count as agreement.
             Self::Gap => !diagnosis.is_agreement(),
             Self::Any => verdict != NoGap || is_faint || !diagnosis.is_agreement(),
         }
@@ -207,7 +207,7 @@ fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
         announce: Some(announce),
     };
     let problem = open(&args.data_set, &reading)?;
-    // An error may come from the rig file as well as from the data, so messages name both.
+    // The rig file or the data may be the cause of an error, so messages name both.
     let beside = || match &args.rig {
         Some(rig) => format!("{} with {}", shown(), rig.display()),
         None => shown(),
@@ -300,7 +300,7 @@ fn conclude(
     Ok(())
 }
 
-/// Prints the sentence, and all details unless the program is quiet.
+/// Prints the sentence of the result and, unless the option `-q` is set, all details.
 pub(super) fn print(examined: &Examined) -> anyhow::Result<()> {
     // With `-v`, effects have the names that are used in files and options.
     let diagnosis = match is_verbose() {

@@ -113,7 +113,7 @@ fn stages(out: &mut Vec<String>, diagnosis: &Diagnosis) {
 }
 
 fn slices(out: &mut Vec<String>, diagnosis: &Diagnosis) {
-    // If simulator and recording agree, one slice in twenty still deviates by chance.
+    // The tables are left out if simulator and recording agree, because one slice in twenty still deviates by chance.
     if diagnosis.answer.agrees() && !matches!(diagnosis.answer, Answer::Faint { .. }) {
         return;
     }
@@ -239,7 +239,7 @@ fn next(out: &mut Vec<String>, diagnosis: &Diagnosis) {
     }));
 }
 
-/// Prints which runs disagree and in which parameters, unless the program is quiet.
+/// Prints which runs disagree and in which parameters, unless the option `-q` is set.
 pub(super) fn print_by_trial(by_trial: &ByTrial) -> anyhow::Result<()> {
     if is_quiet() {
         return Ok(());
@@ -309,7 +309,7 @@ pub(super) fn write_snippets(
 mod tests {
     use stretch_gap::ParameterShift;
 
-    /// A parameter that changed only in the fit without the effect has its change in that column.
+    /// If a parameter changed only in the fit without the effect, the change is in the column of that fit.
     #[test]
     fn changes_of_both_fits_are_listed() {
         let shift = |name: &str, sigmas, bent_sigmas| ParameterShift {

@@ -133,7 +133,8 @@ fn array_doubts(
         let doubts = Doubt::of_method(evaluation, method, spec.all.sd, spec.reference.as_str());
         all.extend(doubts.into_iter().chain(outside).map(|doubt| doubt.of(&errors.method)));
     }
-    // If all together are not shifted, a gauge that is off alone may only have been calibrated on too little.
+    // If the estimate from all gauges is not shifted, the shift of a single gauge is not reported, because too few data
+    // may have been available to calibrate this gauge alone.
     if !all.iter().any(|doubt| doubt.code == SHIFTED) {
         return all;
     }

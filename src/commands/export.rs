@@ -153,8 +153,8 @@ fn per_code(calibration: &Calibration, adc: &Adc) -> String {
     format!(" (one code changes the estimate by {change}{unit} on average)")
 }
 
-/// Returns what to know about the converter of a header. A step in `float` takes the signal itself, so that a header
-/// for another converter can be used without its constants.
+/// Returns notes about the converter of a header. A header in `float` can be used with any converter, because its step
+/// takes the signal and not a code.
 ///
 /// # Errors
 /// A converter in counts that does not have the counts of the signal.

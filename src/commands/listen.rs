@@ -74,7 +74,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     let (shown_port, baud) = path_and_speed(&args.port);
     let heard = port::listen(Path::new(shown_port), baud).with_context(|| shown_port.to_owned())?;
     let header = twin.header();
-    // Created after everything else that can fail, so that a failed start leaves no file.
+    // The file is created after everything else that can fail. Therefore a failed start leaves no file.
     let out = args.out.as_deref();
     let file = out.filter(|out| !is_standard_output(out));
     let recording = file.map(|path| TrialFile::create(path, &header)).transpose();
@@ -113,7 +113,7 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
             Err(RecvTimeoutError::Timeout) => false,
         };
         view.refresh(&session.status);
-        // Without a recording and without a reader there is nothing left to do.
+        // The loop ends if no recording is written and no program reads the output.
         if is_last || result.is_err() || (recording.is_none() && view.is_gone()) {
             break;
         }

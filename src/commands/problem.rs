@@ -107,7 +107,7 @@ pub(crate) fn predict(args: PredictArgs) -> anyhow::Result<ExitCode> {
     Ok(if is_above { ExitCode::from(FAILED_ABOVE) } else { ExitCode::SUCCESS })
 }
 
-/// Prints the sentence, and all details unless the program is quiet.
+/// Prints the sentence of the result and, unless the option `-q` is set, all details.
 fn print(prediction: &Prediction) -> anyhow::Result<()> {
     say_first(prediction.sentence())?;
     if is_quiet() {

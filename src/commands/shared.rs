@@ -50,7 +50,7 @@ impl<P: TypedValueParser> TypedValueParser for Completed<P> {
     }
 }
 
-/// A progress bar on standard error: seen on a terminal only.
+/// Returns a progress bar on standard error. It is visible on a terminal only.
 pub(crate) fn progress(what: &'static str, steps: u64) -> ProgressBar {
     let bar = ProgressBar::new(steps).with_message(what);
     // The template is a constant. If it were wrong, the plain bar would be shown.
@@ -69,7 +69,7 @@ pub(crate) fn spinner() -> ProgressBar {
     ticking(bar)
 }
 
-/// Makes a bar move, or hides it.
+/// Starts the regular updates of a bar, or hides the bar.
 fn ticking(bar: ProgressBar) -> ProgressBar {
     if shows_progress() {
         bar.enable_steady_tick(Duration::from_millis(150));
@@ -79,7 +79,7 @@ fn ticking(bar: ProgressBar) -> ProgressBar {
     bar
 }
 
-/// Adds to the error about an existing folder how it can be replaced.
+/// Adds advice on how to replace the folder to an error about an existing folder.
 pub(crate) fn or_force(error: anyhow::Error) -> anyhow::Error {
     match error.downcast_ref::<FileError>() {
         Some(FileError::Exists { .. }) => anyhow::anyhow!(
@@ -141,7 +141,7 @@ pub(crate) fn on_ctrl_c(exit_code: u8) {
     stretch_data::files::clean_up_and_exit(exit_code)
 }
 
-/// From now on, the first Ctrl-C only sets the flag of [`is_ended`].
+/// After this call, the first Ctrl-C only sets the flag that [`is_ended`] returns.
 pub(crate) fn begin_recording() {
     RECORDING.store(true, SeqCst);
 }

@@ -1,10 +1,9 @@
 //! `stretch demo --paper`: the experiment of the published method ("the paper") on the simulated
 //! rig, compared with the published figures.
 //!
-//! The paper's recordings are not public. The simulated rig has a preset of effects that is one of
-//! several that match the published figures about equally well, so the match is no proof of an
-//! explanation. The errors of trials depend on commands that the paper does not print, so only
-//! their order of magnitude can be compared.
+//! The paper's recordings are not public. The simulated rig has a preset of effects. Several presets match the
+//! published figures about equally well, so the match does not prove that the effects are the right ones. The errors of
+//! trials depend on commands that the paper does not print, so only their order of magnitude can be compared.
 
 mod experiment;
 mod tables;

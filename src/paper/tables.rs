@@ -14,8 +14,8 @@ pub(super) struct PublishedFit {
     rmse_percent: Option<f64>,
 }
 
-/// Published errors of a method: average error in percent, and RMSE in millimetres (which the paper
-/// labels as percent).
+/// Published errors of a method: the average error in percent, and the RMSE in millimetres. (The paper labels the RMSE
+/// as percent.)
 struct PublishedErrors {
     average_error_percent: f64,
     rmse_mm: f64,
@@ -151,7 +151,7 @@ pub(super) fn error_tables(experiment: &Experiment) -> [Table; 2] {
     })
 }
 
-/// Returns sentences on which published findings are reproduced, decided by the figures.
+/// Returns sentences that state which published findings the figures reproduce.
 pub(super) fn verdicts(experiment: &Experiment) -> Vec<String> {
     let there = &experiment.published;
     let mut said = Vec::new();

@@ -35,13 +35,13 @@ impl Pace {
     }
 
     fn wait(&mut self) {
-        // Reading the flag clears it. A missed period is not made up for.
+        // Reading the flag clears it. A missed period is skipped, and the loop waits for the next one.
         while !self.0.has_wrapped() {}
     }
 }
 
-/// Converts and sends samples. A sample that the converter fails to give is sent as missing. The
-/// loop ends only with an error for which `is_end` is true.
+/// Converts and sends samples. If the converter fails, the sample is sent as missing. The loop ends only at an error
+/// for which `is_end` is true.
 fn run<C: Converter>(
     receptor: impl Stage<AdcCode, Out = Result<CodeReading<i32>, Withheld>>,
     converter: &mut C,

@@ -12,7 +12,7 @@ type Receptor = StretchReceptor<f32, Differentiator<f32>>;
 fn make(calibration: Calibration) -> Receptor {
     let spec = LowPassSpec { cutoff: Hertz(5.0), sample_rate: calibration.spec().sample_rate_hz };
     let rate = Differentiator::new(spec).expect("a rate that can be designed");
-    // the calibration was fitted with another estimator; this program only measures the cost of this one
+    // the calibration was fitted with another estimator; the program only measures the cost of the differentiator
     let rate_estimator = RateEstimator::Differentiator { cutoff_hz: 5.0 };
     let spec = CalibrationSpec { rate_estimator, ..calibration.into_spec() };
     let calibration = Calibration::new(spec).expect("only the name of the estimator differs");

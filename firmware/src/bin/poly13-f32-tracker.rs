@@ -18,7 +18,7 @@ impl Design for Rate {
     }
 }
 
-/// The calibration was fitted with another estimator. This program only measures the cost of this one.
+/// The calibration was fitted with another estimator. The program only measures the cost of the tracker.
 impl NamedRate for Rate {}
 
 impl Stage<f32> for Rate {

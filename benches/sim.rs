@@ -20,7 +20,7 @@ fn set(effects: &[(&str, &[(&str, f64)])]) -> EffectSet {
     set
 }
 
-/// Random segments like those of the arbitrary trial, from a fixed generator.
+/// Random segments as in the arbitrary trial, from a random generator with a fixed seed.
 fn openings() -> (Vec<f64>, Vec<f64>) {
     let (mut inlet, mut outlet) = (vec![0.0; SAMPLES], vec![0.0; SAMPLES]);
     let mut state = 12345u64;

@@ -245,7 +245,8 @@ const WIDEST: usize = 100;
 /// Smallest width: a narrower terminal breaks the lines itself.
 const NARROWEST: usize = 30;
 
-/// Columns of the terminal: those of `COLUMNS`, otherwise those that the terminal reports. A table may use them all.
+/// Number of columns of the terminal, from the variable `COLUMNS`, otherwise from the terminal. A table may use all of
+/// them.
 pub(crate) fn columns() -> usize {
     let set = env::var("COLUMNS").ok().and_then(|text| text.trim().parse().ok());
     let found = || terminal_size().map(|(Width(columns), _)| usize::from(columns));

@@ -129,7 +129,7 @@ pub fn run() -> ExitCode {
         Ok(parsed) => parsed,
         Err(answer) => return explain(&answer),
     };
-    // Without a handler Ctrl-C still ends the program, but temporary files are not removed.
+    // If the handler cannot be set, Ctrl-C still ends the program, but temporary files are not removed.
     let _ = ctrlc::set_handler(|| commands::shared::on_ctrl_c(INTERRUPTED));
     display::begin(match (cli.quiet, cli.verbose) {
         (true, _) => Volume::Quiet,

@@ -9,9 +9,9 @@ use crate::trial;
 
 /// A converter that takes one sample per call.
 ///
-/// embedded-hal 1.0 has no trait for converters. Most chips' crates still implement that of
-/// embedded-hal 0.2 ([`OneShot`]), and [`Pin`] adapts it to this trait. A chip whose crate does not
-/// implement it can implement this trait directly.
+/// embedded-hal 1.0 has no trait for converters. The crates of most chips still implement the trait of embedded-hal 0.2
+/// ([`OneShot`]), and [`Pin`] adapts it. If the crate of your chip does not implement [`OneShot`], implement this trait
+/// directly.
 pub trait Converter {
     /// Error if there is no sample.
     type Error;

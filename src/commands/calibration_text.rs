@@ -19,8 +19,8 @@ const KINDS: [&str; 3] = ["arbitrary", "pulses", "ramps"];
 /// Number of models that are shown without `-v`.
 const SHOWN: usize = 8;
 
-/// Returns the models that `auto` compared as a table, with the chosen model first, and which of them
-/// exports to C. Without `-v`, only the best models are shown.
+/// Returns the models that `auto` compared as a table, with the chosen model first. Also says which model can be
+/// exported to C. Without `-v`, only the best models are shown.
 pub(super) fn blocks_of_models(choice: &ModelChoice, reference: &str) -> Vec<String> {
     let chosen = choice.model.to_string();
     let (own, others): (Vec<&ModelRow>, Vec<_>) =

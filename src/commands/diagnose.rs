@@ -255,7 +255,7 @@ pub(super) fn told_on(bar: &ProgressBar) -> impl Fn(&str) + Sync {
     }
 }
 
-/// Writes all files or none, and then prints, so that the messages about written files are true.
+/// Writes all files or none. Prints afterwards, because the messages name the files that were written.
 fn conclude(
     args: &Args,
     (examined, by_trial): (&Examined, Option<&ByTrial>),

@@ -63,8 +63,8 @@ impl Recorded {
         self.time.stored()
     }
 
-    /// Returns the reading options for a calibration. Unless a time column is given, it is that of the calibration's
-    /// trials.
+    /// Returns the reading options for a calibration. If no time column is given, the time column is that of the
+    /// calibration's trials.
     pub(super) fn options_of(&self, calibrated_on: &Provenance) -> ReadOptions {
         match calibrated_on.time().parse::<TimeColumn>() {
             Ok(time)
@@ -171,7 +171,7 @@ pub(crate) fn read_trials(
 /// at the end of the batch.
 const BATCH: usize = 256;
 
-/// Reads recordings on all cores. Notes and the first error are those of reading in order.
+/// Reads recordings on all cores. Notes and the first error are the same as if the recordings were read in order.
 fn read_all<T: Sync>(
     items: &[T],
     read: impl Fn(&T) -> Result<Recording, RecordingError> + Send + Sync,

@@ -53,7 +53,7 @@ pub enum CalibrateError {
     /// A number is outside its valid range.
     #[error("the calibration is not possible: {}", in_words(.0))]
     Design(#[from] DesignError),
-    /// The calibration has no form in integers, with any converter.
+    /// The calibration cannot be converted to integers, whatever the converter is.
     #[error("{0}")]
     NoFixedForm(String),
     /// The converter does not measure the signal of the trials.

@@ -17,7 +17,7 @@ pub(crate) struct Scales {
     pub(crate) signal: Range,
 }
 
-/// Returns the largest distance of a point of the domain from the offset.
+/// Returns the largest distance between the offset and a point of the domain.
 fn reach(domain: Interval, offset: f64) -> f64 {
     (domain.min - offset).abs().max((domain.max - offset).abs())
 }
@@ -34,8 +34,8 @@ pub(crate) fn line_holds(scales: &Scales, line: &LinearMap) -> Result<(), Design
     DesignError::check("linear.intercept", line.intercept, furthest <= MOST_PRODUCT).map(|_| ())
 }
 
-/// Checks a surface by Horner's rule over the magnitudes of the folded coefficients. In the actual evaluation every
-/// intermediate sum is at most as large as the sums here.
+/// Checks a surface by Horner's rule over the magnitudes of the folded coefficients. When the surface is evaluated, no
+/// intermediate sum is larger than the sums computed here.
 pub(crate) fn surface_holds(scales: &Scales, branch: &BranchSurface) -> Result<(), DesignError> {
     const FIELD: &str = "surface.coefficients";
     const RATE: [&str; 2] = ["rate_range", "span of rate_range"];
@@ -58,7 +58,7 @@ pub(crate) fn surface_holds(scales: &Scales, branch: &BranchSurface) -> Result<(
             let c = gain * branch.surface.coefficient(i, j).abs() / scale;
             rise = rise * v + row;
             row = row * v + c;
-            // each intermediate must fit by itself, even if a small factor follows
+            // each intermediate result must be within the limits, even if a small factor follows
             for x in [c, rise, row] {
                 holds(x, MOST_PRODUCT)?;
             }

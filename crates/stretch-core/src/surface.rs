@@ -173,7 +173,7 @@ impl<T: Real> From<Poly13<T>> for Surface<T> {
 }
 
 impl<T: Real> Surface<T> {
-    /// Converts the surface to a [`Poly13`], if the term set of its degree is within that of poly13.
+    /// Converts the surface to a [`Poly13`]; `None` if its degree has terms that poly13 lacks.
     pub fn as_poly13(&self) -> Option<Poly13<T>> {
         let fits = self.degree.exponents().all(|(i, j)| i <= 1 && i + j <= 3);
         fits.then(|| Poly13 {

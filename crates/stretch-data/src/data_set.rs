@@ -270,8 +270,8 @@ pub(crate) fn unchanged_trials(folder: &Path) -> Vec<PathBuf> {
 }
 
 impl TrialEntry {
-    /// Checks that a trial's file is the one with which the data set was written, if its digest is
-    /// known.
+    /// If the data set contains the digest of a trial's file, checks that the file has not changed since the data set
+    /// was written.
     ///
     /// # Errors
     /// [`DataError::Key`] with the digest found; [`DataError::File`] if the file does not exist.

@@ -26,7 +26,7 @@ fn a_writer_that_fails_leaves_what_was_there() {
             fs::write(&path, old).expect("written");
         }
         let error = write_whole(&path, |out| {
-            // More than any buffer, so that some of it has reached the disk.
+            // The text is longer than any buffer. Therefore a part of it has reached the disk.
             out.write_all(&vec![b'x'; 1 << 20])?;
             Err(disk_full())
         })
@@ -248,7 +248,7 @@ fn a_pipe_is_written_to_and_one_without_a_reader_is_refused() {
         let pipe = pipe.clone();
         move || fs::read(pipe).expect("read")
     });
-    // More than the buffer of a pipe, so that the writer waits for the reader.
+    // The text is longer than the buffer of a pipe. Therefore the writer waits for the reader.
     let text = vec![b'x'; 1 << 18];
     write_whole(&pipe, |out| out.write_all(&text)).expect("written");
     assert!(read.join().expect("no panic") == text);

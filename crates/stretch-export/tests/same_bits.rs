@@ -389,7 +389,8 @@ fn a_changed_record_is_loaded_as_in_rust() {
     }
 }
 
-/// An Uno has integers of 16 bits, a `double` of 32, 2 KB of RAM, and another library for floats.
+/// On an Uno an `int` has 16 bits and a `double` 32, there are 2 KB of RAM, and floats are computed by a different
+/// library.
 #[test]
 #[ignore = "needs avr-gcc and simavr; ./ci.sh runs it"]
 fn with_avr_gcc_an_uno_gives_the_same_bits() {
@@ -415,7 +416,7 @@ fn with_avr_gcc_an_uno_gives_the_same_bits() {
     }
 }
 
-/// Flash and RAM of an Uno: 32 KB less the bootloader, and 2 KB.
+/// Bytes of flash (32 KB minus the bootloader) and of RAM (2 KB) of an Uno.
 const UNO_BYTES: [usize; 2] = [32_256, 2_048];
 
 /// Counts the bytes of flash, of RAM without stack, and of stack, for the calibrations that `firmware/c.sh` exports.

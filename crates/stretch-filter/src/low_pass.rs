@@ -68,8 +68,8 @@ impl LowPassSpec {
     ) -> Result<Biquad<T>, DesignError> {
         let [ra1, ra2] = [a1, a2].map(|a| T::from_f64(a).as_f64());
         let sum = 1.0 + ra1 + ra2;
-        // 1 + a1 + a2 is nearly proportional to cutoff^order, so its relative change by rounding
-        // bounds that of the cutoff.
+        // 1 + a1 + a2 is nearly proportional to cutoff^order. Therefore the relative change of this sum by rounding is
+        // a bound for the relative change of the cutoff.
         let kept = (sum / exact_sum - 1.0).abs() <= 0.01;
         DesignError::check("cutoff_hz", self.cutoff.0, kept)?;
         let (b0, b1, b2) = if order == 2 {

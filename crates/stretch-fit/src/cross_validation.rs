@@ -34,10 +34,10 @@ impl<T: Real> HeldOut<T> {
 
 /// Evaluates, on each trial, the surface that is fitted on all other trials, and calls `visit` with the result.
 ///
-/// Each trial is given by its [`Factor`]. The factors of the other trials are merged. The error on the trial left out
-/// follows from its factor as `|R c - q|^2` plus its residual sum of squares, so no sample is read again. `k` trials
-/// take `k log k` merges. Whole trials are left out because neighbouring samples of a trial are correlated, so leaving
-/// out single samples would give errors that are too small.
+/// Each trial is given by its [`Factor`]. The factors of the other trials are merged. The factor of the trial that is
+/// left out gives the squared error on this trial: `|R c - q|^2` plus the residual sum of squares. Therefore no sample
+/// is read again. `k` trials take `k log k` merges. Whole trials are left out because neighbouring samples of a trial
+/// are correlated, so leaving out single samples would give errors that are too small.
 ///
 /// `degree` may be any degree within the accumulated one. Trials without samples are skipped.
 ///

@@ -12,8 +12,8 @@ use crate::{
     shift::{apply, product, shift},
 };
 
-/// The triangular factor `R` of a weighted design matrix, with `q = Q^T z` and the residual sum of squares. These are
-/// all that least squares needs of the samples, in about `TERMS^2` numbers.
+/// The triangular factor `R` of a weighted design matrix, with `q = Q^T z` and the residual sum of squares. Least
+/// squares needs nothing else from the samples. A factor has about `TERMS^2` numbers.
 ///
 /// Factors can be merged ([`merge`](Self::merge)). A factor of a high degree gives the fits of every degree within it
 /// ([`fit_degree`](Self::fit_degree)), so a log is read only once.

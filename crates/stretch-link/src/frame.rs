@@ -45,9 +45,9 @@ pub enum Answer {
 }
 
 impl Answer {
-    /// Returns the last cells of a row of a recording: estimate in the reference's unit, branch and domain, or two empty
-    /// cells and the reason why there is no estimate. If the target of the calibration is known, the branch is the
-    /// direction of the reference, otherwise that of the target.
+    /// Returns the last cells of a row of a recording: estimate in the reference's unit, branch and domain, or two
+    /// empty cells and the reason why there is no estimate. The branch is the direction of the reference if the target
+    /// of the calibration is known, otherwise the direction of the target.
     ///
     /// ```
     /// use stretch_link::Answer;

@@ -88,7 +88,7 @@ pub struct Diagnosed<T> {
     /// Time over which the estimate is extrapolated at its rate, in seconds. It is shorter than the delay that it
     /// compensates, because the modelled rate decays.
     pub ahead_s: T,
-    /// Factor from the filter's standard deviation to the one that is reported, in reference units.
+    /// Factor by which the filter's standard deviation is multiplied to get the reported one, in reference units.
     pub spread: T,
     /// Half-width of the sensor's slip.
     pub slip: T,

@@ -15,8 +15,8 @@ pub enum ReceptorError {
     /// The rate estimator that the calibration names needs later samples, which a live stream does
     /// not have.
     LooksAhead,
-    /// The rate estimator or its sample rate is not the one with which the calibration was fitted. The
-    /// variant has no numbers, because their formatting would cost a board some kilobytes.
+    /// The calibration was fitted with another rate estimator or another sample rate. The variant has no numbers,
+    /// because their formatting would cost a board some kilobytes.
     Rate,
 }
 

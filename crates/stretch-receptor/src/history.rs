@@ -44,7 +44,8 @@ pub struct History<T, R> {
     centre: [T; MAX_STATES],
     per_half: [T; MAX_STATES],
     terms: usize,
-    /// For every term beyond the constant, the indices of the earlier term and of the state whose product it is.
+    /// For every term except the constant: the indices of an earlier term and of a state. The term is the product of
+    /// the two.
     products: [(u8, u8); MAX_HISTORY_TERMS],
     coefficients: [T; MAX_HISTORY_TERMS],
     low: T,

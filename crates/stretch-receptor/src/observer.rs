@@ -125,7 +125,7 @@ impl<T: Real> ObserverReceptor<T> {
 }
 
 impl<T: Real> Observer<T> {
-    /// Returns the drive at which the curve has the signal, and the signal clamped to the curve.
+    /// Returns the drive at which the curve has the value `signal`, and the signal clamped to the ends of the curve.
     #[inline(always)]
     fn inverse(&self, signal: T) -> (T, T) {
         let (first, last) = self.curve.ends();

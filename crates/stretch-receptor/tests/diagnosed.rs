@@ -123,7 +123,7 @@ fn inverted(map: DiagnosedMap, pressure: impl Fn(f64) -> f64) -> (f64, f64) {
         memory.set_pressure(pressure(motion[shown]));
         let volts = curve(drives[shown]) + map.noise * noise(i);
         let reading = receptor.step(&mut memory, Volts(volts)).unwrap();
-        // an 180 mm muscle whose stroke is 0.165 of it
+        // a muscle of 180 mm with a stroke of 0.165 of this length
         let found = (180.0 - reading.estimate) / (180.0 * 0.165);
         let sd = reading.sd.unwrap() / (180.0 * 0.165);
         if i > 20 {

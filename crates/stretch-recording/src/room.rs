@@ -108,7 +108,7 @@ pub(crate) fn whole(
     }
 }
 
-/// An unpacked gzip stream. Reading fails if its compression ratio exceeds that of any recording.
+/// An unpacked gzip stream. Reading fails if the compression ratio is too high for a recording.
 pub(crate) struct Unpacked<R> {
     decoder: flate2::read::MultiGzDecoder<Counted<R>>,
     given: u64,

@@ -206,7 +206,8 @@ fn a_recorder_that_is_silent_costs_no_channel() {
         if silent && n % 100 % 60 >= 3 {
             assert_eq!(reading, Err(ArrayWithheld::Missing), "at {n}");
         } else {
-            // The last channel never has a possible sample, and is lost after three of them.
+            // All samples of the last channel are outside its possible range, and the channel is lost after three
+            // samples.
             let Ok(reading) = reading else { panic!("{reading:?} at {n}") };
             assert_eq!(reading.lost, 0b1000, "at {n}");
             // Three samples are bridged while the motion continues.

@@ -76,7 +76,7 @@ fn turns_stand_beside_a_calibration_in_text_and_are_checked() {
     assert_eq!(GaugeCalibration::from_json(&text, "cal.json").unwrap(), gauge);
     // A reader of a calibration skips the turning points.
     assert_eq!(&calibration_from_json(&text, "cal.json").unwrap(), gauge.calibration());
-    // Without turning points the file is that of the calibration.
+    // Without turning points, the file equals the file of the calibration alone.
     let without = GaugeCalibration::new(example_calibration(), None).unwrap();
     assert_eq!(without.to_json().unwrap(), calibration_to_json(&example_calibration()).unwrap());
     let spoilt = |change: &dyn Fn(&mut Value)| {

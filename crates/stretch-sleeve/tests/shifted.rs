@@ -41,7 +41,7 @@ impl Sleeve {
         let times: Vec<f64> = (0..(seconds * HZ) as usize).map(|n| n as f64 / HZ).collect();
         let values = times.iter().map(|&t| angle(t)).collect();
         let mut channels = vec![Channel { name: "angle_deg".into(), values }];
-        // The errors of a gauge last for about two seconds, as those of a garment do.
+        // The errors of a gauge have a correlation time of about two seconds, as in a garment.
         for (k, &[gain, curve, noise]) in self.gauges.iter().enumerate() {
             let mut wander = 0.0;
             let off = if k == shifted.0 { shifted.1 } else { 0.0 };

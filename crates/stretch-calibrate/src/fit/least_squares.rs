@@ -93,7 +93,7 @@ impl LinearFactor {
         self.triangle.ncols() - 1
     }
 
-    /// Returns the factor of the rows of both factors.
+    /// Returns the factor of all rows from which the two factors were computed.
     pub fn merged(&self, other: &Self) -> Self {
         let mut rows = RowAccumulator::new(self.terms());
         rows.absorb(self, |term| term);
@@ -130,7 +130,7 @@ impl LinearFactor {
     }
 }
 
-/// Returns the factor of all parts, and for each part the factor of all others.
+/// Returns the factor of the rows of all parts and, for each part, the factor of the rows of all other parts.
 pub fn leave_one_out(parts: &[LinearFactor]) -> Option<(LinearFactor, Vec<LinearFactor>)> {
     let (first, rest) = parts.split_first()?;
     // `after[k]` holds the parts from k + 1 on, so that no part has to be subtracted.

@@ -174,7 +174,7 @@ fn evaluate_lag(
     most_s: f64,
 ) -> Result<Evaluation, CalibrateError> {
     let (_, first) = calibrations.first().ok_or(CalibrateError::NoTrials)?;
-    // The rows of a table have no lag.
+    // The rows of a table have no times, so there is no lag.
     let most_s = if trials.iter().all(Trial::counts_rows) { 0.0 } else { most_s };
     let methods = Methods {
         names: std::iter::once("raw").chain(calibrations.iter().map(|(name, _)| *name)).collect(),

@@ -36,7 +36,7 @@ pub struct Twin {
 enum Own {
     Volts(Box<Runner<Receptor<f64>>>),
     Codes(Box<BoardReceptor>),
-    /// There is no calibration, or its rate estimator needs the next sample.
+    /// Gives no estimates: there is no calibration, or its rate estimator needs the next sample.
     Silent,
 }
 
@@ -235,7 +235,8 @@ impl LinkStatus {
         text
     }
 
-    /// Returns how the estimates of the board differ from those of the calibration, if they were compared.
+    /// Returns a sentence on the difference between the estimates of the board and those of the calibration; empty if
+    /// they were not compared.
     fn comparison(&self, frames: u64) -> String {
         let mut text = String::new();
         match self.compared {
@@ -331,8 +332,8 @@ impl Link {
         let frame = event.frame()?;
         let goes_on = matches!(event, Event::Frame(_));
         if !goes_on {
-            // The board has seen samples that did not arrive here, or has restarted. Without further
-            // memory, board and computer agree again once the window of the rate filter is filled.
+            // The board has seen samples that did not arrive here, or has restarted. If the model has no memory, board
+            // and computer agree again when the window of the rate filter is full.
             self.twin.reset();
         }
         self.is_whole = frame.counter == 0 || (goes_on && self.is_whole);

@@ -53,8 +53,8 @@ pub fn without_gross_errors(trials: Vec<Trial>, columns: &[&str]) -> (Vec<Trial>
     (kept, sentences)
 }
 
-/// Returns a sentence about the gross errors of a column: their number, that of all values, and their least and
-/// greatest value.
+/// Returns a sentence about the gross errors of a column: their number, the number of all values, and the least and the
+/// greatest gross error.
 fn sentence(
     column: &str,
     (gross, of): (u64, u64),
@@ -74,7 +74,8 @@ fn span(values: &[f64]) -> Option<(f64, f64)> {
     sorted.sort_by(f64::total_cmp);
     let most = (MOST_SHARE * sorted.len() as f64) as usize;
     let (mut from, mut to) = (0, sorted.len().checked_sub(1)?);
-    // The widest gaps lie furthest outside, so the ends are cut alternately until nothing changes.
+    // Cuts values off the low and the high end alternately, until no gap is wider than the range of the remaining
+    // values.
     loop {
         let before = (from, to);
         let left = most - (from + sorted.len() - 1 - to).min(most);
@@ -95,7 +96,7 @@ fn span(values: &[f64]) -> Option<(f64, f64)> {
         }
     }
     let (low, high) = (sorted[from], sorted[to]);
-    // A channel that is constant except for a few values has no range for a comparison.
+    // If a channel is constant except for a few values, its range is zero, and no gap can be compared with it.
     (low < high && (from > 0 || to + 1 < sorted.len())).then_some((low, high))
 }
 

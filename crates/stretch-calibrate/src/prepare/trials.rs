@@ -199,8 +199,8 @@ impl Evened {
     ) -> Result<(), CalibrateError> {
         check_rate(trial, first, sample_rate)?;
         let mut columns = vec![options.signal.as_str(), options.reference.as_str()];
-        // The column is added only if the pressure was recorded. If it is missing, a later error names the cause that
-        // needs it.
+        // The column is added only if the pressure was recorded. If the pressure is missing, a later error names the
+        // effect that needs it.
         let has_pressure = options.needs_pressure() && trial.channel(PRESSURE).is_some();
         columns.extend(has_pressure.then_some(PRESSURE));
         let even = even(trial, &columns, 1, sample_rate)?;

@@ -144,7 +144,8 @@ fn without_turns(object: &str) -> Option<serde_json::Value> {
     value.as_object_mut()?.remove("turns").map(|_| value)
 }
 
-/// Returns what the text of a file is that is often taken for a calibration; `None` for a damaged calibration.
+/// If a text is a file of another kind that users may mistake for a calibration, returns this kind; `None` for a
+/// damaged calibration.
 fn other_kind(text: &str) -> Option<&'static str> {
     let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
     let first = first?;

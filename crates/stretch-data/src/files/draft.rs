@@ -103,20 +103,20 @@ impl Draft {
         };
         let made = Builder::new().prefix(".stretch-").suffix(".tmp").make_in(parent, make)?;
         let (file, temporary) = made.keep().map_err(|kept| kept.error)?;
-        // If files cannot be locked, no process cleans up.
+        // A failed lock is ignored: on a system that cannot lock files, no process removes the remains of another one.
         let _ = file.as_ref().map(File::try_lock);
         names.push((temporary.clone(), path.to_owned()));
         Ok(Self { path: path.to_owned(), real, temporary, file, force: false, replaced: None })
     }
 
-    /// Renames all drafts to their targets. Ctrl-C waits until all are renamed.
+    /// Renames all drafts to their targets. The handler of Ctrl-C waits until all of them are renamed.
     pub(super) fn rename(drafts: &mut [Self]) -> Result<(), FileError> {
         use io::ErrorKind::{AlreadyExists, DirectoryNotEmpty, NotADirectory};
         let _names = names();
         for draft in drafts {
             let is_folder = draft.file.is_none();
             draft.place().map_err(|cause| match cause.kind() {
-                // Another writer was faster.
+                // Another process has created the target in the meantime.
                 AlreadyExists | DirectoryNotEmpty | NotADirectory if is_folder => {
                     FileError::exists(&draft.path)
                 }
@@ -134,7 +134,8 @@ impl Draft {
                 return replace(self);
             }
             if cfg!(windows) {
-                // On other systems, renaming a folder replaces an empty one.
+                // An empty target is removed first, because on Windows renaming a folder does not replace it, as it
+                // does on other systems.
                 let _ = fs::remove_dir(&self.real);
             }
         }

@@ -13,13 +13,13 @@ use crate::{
 
 /// The most knots of a curve in fixed point.
 pub(super) const KNOTS: usize = 32;
-/// Bits behind the point of targets, drives, and rates per sample.
+/// Number of fractional bits of targets, drives, and rates per sample.
 pub(super) const TARGET_BITS: u32 = 26;
-/// Bits behind the point of weights in the drive.
+/// Number of fractional bits of the weights in the drive.
 pub(super) const WEIGHT_BITS: u32 = 20;
-/// Bits behind the point of a position between knots.
+/// Number of fractional bits of a position between knots.
 pub(super) const PLACE_BITS: u32 = 16;
-/// Bits behind the point of shares.
+/// Number of fractional bits of shares.
 pub(super) const SHARE_BITS: u32 = 31;
 /// Bits by which a 16-bit sample is shifted up.
 pub(super) const SIGNAL_BITS: u32 = 12;
@@ -30,7 +30,7 @@ const MOST_WEIGHT: i32 = 16 << WEIGHT_BITS;
 const MOST_LEAD: i32 = 1000 << WEIGHT_BITS;
 
 /// The integers that a [`FixedObserver`](super::FixedObserver) computes with. Signals are in `2^-12` of a 16-bit step,
-/// negated if the signal falls as the target rises. Targets, drives and rates per sample have 26 bits behind the point,
+/// negated if the signal falls as the target rises. Targets, drives and rates per sample have 26 fractional bits,
 /// weights 20, positions between knots 16, and shares 31.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -67,7 +67,7 @@ pub struct ObserverNumbers {
     pub ends: [i32; SLOPES - 1],
     /// Kalman gains as change of the state per unit of signal, times `2^gain_bits`; one row per slope.
     pub gains: [[i32; STATES]; SLOPES],
-    /// Bits behind the point of `gains`.
+    /// Number of fractional bits of `gains`.
     pub gain_bits: u8,
     /// The least target.
     pub low: i32,
@@ -80,7 +80,7 @@ pub struct ObserverNumbers {
     pub zero: i64,
     /// Thousandths of the reference's unit per unit of target, times `2^output_bits`.
     pub gain: i32,
-    /// Bits behind the point of `gain`; `zero` has `TARGET_BITS` more.
+    /// Number of fractional bits of `gain`; `zero` has `TARGET_BITS` more.
     pub output_bits: u8,
     /// The tracker of the baseline, which runs only if `pull` is above zero.
     pub rest: RestNumbers,
@@ -280,7 +280,7 @@ fn each<const N: usize>(
     Ok(out)
 }
 
-/// Returns the number of bits behind the point with which `largest` fits 31 bits.
+/// Returns the number of fractional bits with which `largest` fits 31 bits.
 fn bits_for(largest: f64) -> u32 {
     let (mut bits, mut scaled) = (0, largest);
     while bits < 60 && 2.0 * scaled < f64::from(i32::MAX) {

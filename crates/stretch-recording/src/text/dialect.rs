@@ -12,7 +12,7 @@ use crate::{
 };
 
 /// Number of characters of the longest integer time that is read as a floating-point number. The times that the project
-/// writes are not longer, but those of nanosecond clocks are.
+/// writes are not longer, but the times of nanosecond clocks are longer.
 const EXACT_DIGITS: usize = 17;
 /// Separator that represents runs of blanks and tabs.
 pub(crate) const BLANKS: u8 = b' ';
@@ -184,8 +184,8 @@ impl Dialect {
         Ok(())
     }
 
-    /// Returns whether a needed column may lack a value in this row. Any column but the time may, because it may have a
-    /// separate clock.
+    /// Returns whether a needed column may lack a value in this row. Only the time must have a value in each row,
+    /// because any other column may have a separate clock.
     fn may_be_blank(&self, (fault, _): &Fault, column: usize) -> bool {
         matches!(fault, FieldFault::Empty | FieldFault::NotFinite) && Some(column) != self.time
     }

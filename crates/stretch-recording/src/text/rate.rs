@@ -41,8 +41,8 @@ pub(crate) fn stated_rate_hz(lines: &[&[u8]], delimiter: u8) -> Option<(f64, Str
     places.filter_map(stated).next()
 }
 
-/// Returns the sample rate from a field, if its name is that of a rate or an interval and its value is a number with or
-/// without a unit.
+/// Returns the sample rate from a field; `None` unless the name means a rate or an interval and the value is a number,
+/// with or without a unit.
 fn rate_of(key: &str, value: &str) -> Option<f64> {
     let (key, of_key) = match key.trim().strip_suffix([')', ']']) {
         Some(key) => key.split_once(['(', '['])?,

@@ -191,7 +191,8 @@ pub(crate) fn correlation(a: impl Iterator<Item = f64>, b: impl Iterator<Item = 
 ///
 /// Consecutive values are dependent if their correlation `r` is above zero. `n` of them are then equivalent to `n (1 -
 /// r)/(1 + r)` independent values (Bayley and Hammersley, J. Roy. Stat. Soc. Suppl. 8 (1946) 184, for a process of
-/// first order). Their mean and their variance are as accurate as those of so many independent values.
+/// first order). Their mean and their variance are as accurate as if they were computed from this number of independent
+/// values.
 pub(crate) fn independent(count: f64, variance: f64, alike: f64) -> (f64, f64) {
     let independent = count * (1.0 - alike) / (1.0 + alike);
     (independent, (variance * independent / (independent - 1.0)).sqrt())

@@ -203,7 +203,7 @@ impl SleeveCalibration {
         let bytes = read_whole(path).unwrap_or_default();
         if is_postcard(path) {
             let several = record::load(&bytes).map(|several| Self::Many(Box::new(several)));
-            // If the file contains neither, report the error for the most common kind.
+            // If the file contains neither kind, report the error for the most common one.
             return several.or_else(|_| one());
         }
         let text = String::from_utf8(bytes).unwrap_or_default();
@@ -237,7 +237,7 @@ fn unusable(file: &str, cause: impl std::fmt::Display) -> CalibrateError {
 /// refused, because postcard cannot be edited by hand.
 ///
 /// # Errors
-/// The errors of [`SleeveCalibration::read`] except that of the digest, and those of writing.
+/// The errors of [`SleeveCalibration::read`], except for an invalid digest, and the errors of writing.
 pub fn seal_record(path: &Path) -> Result<SleeveCalibration, CalibrateError> {
     let text = read_whole(path).ok().and_then(|bytes| String::from_utf8(bytes).ok());
     let file = path.display().to_string();

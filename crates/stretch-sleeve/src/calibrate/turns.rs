@@ -68,8 +68,8 @@ pub fn find_turns(calibration: &Calibration, signals: &[&[f64]]) -> Option<Turns
     Some(turns).filter(|turns| turns.validate().is_ok())
 }
 
-/// Returns a note for a calibration without the turning points of movements, with the number of movements in its trials;
-/// `None` if the calibration has turning points or needs only the signal, as that of a load cell.
+/// Returns a note for a calibration that lacks the turning points of movements. The note states the number of movements
+/// in the trials; `None` if the calibration has turning points, or if it needs only the signal, as for a load cell.
 pub fn missing_turns(gauge: &GaugeCalibration, trials: &[Trial]) -> Option<String> {
     let spec = gauge.calibration().spec();
     if gauge.turns().is_some() || spec.model.needs_signal_only() {

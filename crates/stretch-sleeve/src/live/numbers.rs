@@ -60,7 +60,7 @@ pub struct ArrayChannelNumbers<T, const N: usize> {
     /// Number of repetitions from which on the channel counts as stuck; 0: repetitions are usual
     /// and not checked.
     pub still_samples: u16,
-    /// Coefficients that predict this channel's movement from that of each other one.
+    /// Coefficients that predict the movement of this channel from the movements of the other channels.
     pub follows: [T; N],
     /// Reciprocal of the largest jump.
     pub per_slip: T,

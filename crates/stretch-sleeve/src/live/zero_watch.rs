@@ -173,7 +173,8 @@ pub struct Zero<T> {
     /// The resulting deviation of the estimate, in the reference's unit, from the slope of the calibration curve at the
     /// turning points.
     pub off_reference: T,
-    /// Followed part of the deviation, in the signal's unit; 0 if the zero is not followed.
+    /// Value of the followed zero: the part of the deviation that is subtracted from the signal, in the signal's unit;
+    /// 0 if the zero is not followed.
     pub followed: T,
     /// Whether the zero has shifted across a pause, so that the calibration no longer describes the signal.
     pub has_shifted: bool,

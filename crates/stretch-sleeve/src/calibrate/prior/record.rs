@@ -70,7 +70,7 @@ fn sealed(what: [&str; 2], record: &impl Serialize, name: &str) -> Result<String
     digest::join(&object).ok_or_else(|| problem(what, name, "it is not a JSON object"))
 }
 
-/// Reads the object of a file, after a check that the digest is that of its text.
+/// Checks the digest of a file and reads its object.
 fn opened<T: for<'d> Deserialize<'d>>(
     what: [&str; 2],
     path: &Path,

@@ -105,7 +105,7 @@ fn seconds_of_reference_and_a_wearer_that_was_seen_each_lower_the_error() {
     assert!(updated < 0.3 * alone, "{updated} of {alone}");
     let half_width = |told: &UpdateSummary| told.half_width_95.unwrap();
     assert!(half_width(&narrow) < 0.5 * half_width(&wide));
-    // The errors are those of the prior's table.
+    // The errors equal those in the table of the prior.
     let row = |k: usize| (prior.expected[k].rmse_new, prior.expected[k].half_width_95_new);
     for (told, k) in [(&wide, 0), (&narrow, 1)] {
         assert_eq!((told.expected_rmse, told.half_width_95), row(k));

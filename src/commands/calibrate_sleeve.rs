@@ -226,7 +226,7 @@ fn sentence(made: &Made) -> String {
     }
 }
 
-/// Returns the share of each channel as a table, and the notes.
+/// Returns a table with the errors of each channel alone and of the calibration without it, and the notes.
 fn blocks(made: &Made) -> Vec<String> {
     let mut blocks = Vec::new();
     if made.rmse.is_some() {

@@ -157,7 +157,7 @@ fn per_code(calibration: &Calibration, adc: &Adc) -> String {
 /// takes the signal and not a code.
 ///
 /// # Errors
-/// A converter in counts that does not have the counts of the signal.
+/// Fails if the converter is given in counts but its counts are not those of the signal.
 fn notes(made: &Header) -> anyhow::Result<Vec<String>> {
     let mut notes = match made.converter_notes() {
         Err(error) if !made.adc.is_in_counts() => {

@@ -5,7 +5,7 @@ use stretch_report::{Table, number};
 
 use super::experiment::Experiment;
 
-/// A fit as published.
+/// The published errors of one fit.
 #[derive(Clone, Copy)]
 pub(super) struct PublishedFit {
     /// Coefficient of determination.

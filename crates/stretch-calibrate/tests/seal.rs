@@ -226,7 +226,7 @@ fn a_field_of_a_newer_program_is_refused_wherever_it_stands() {
 fn a_record_with_sorted_fields_is_told_as_one_and_sealed_again() {
     for calibration in kinds() {
         let text = calibration_to_json(&calibration).unwrap();
-        // The format of `jq -S`.
+        // The program `jq -S` writes JSON in this form.
         let sorted = serde_json::from_str::<Value>(&text).unwrap().to_string();
         let message = calibration_from_json(&sorted, "cal.json").unwrap_err().to_string();
         let says = "its fields were sorted; check every number, then renew it with: stretch export";

@@ -1,4 +1,4 @@
-//! Short names stored inline, without an allocator, and the characters that a name can hide.
+//! Short names stored inline, without an allocator, and a check for invisible characters in names.
 
 use core::fmt;
 

@@ -146,8 +146,7 @@ impl Model {
         }
     }
 
-    /// Returns the error of a caller that accepts only models of kind `expected`: [`DesignError::Mismatch`] with
-    /// this model's name.
+    /// Returns the error that a model of kind `expected` is required: [`DesignError::Mismatch`] with this model's name.
     pub fn instead_of(&self, expected: &'static str) -> DesignError {
         DesignError::Mismatch { field: "model", expected, found: self.name() }
     }

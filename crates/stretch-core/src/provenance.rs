@@ -70,7 +70,8 @@ impl Provenance {
         Self { time: Label::truncated(time), ..self }
     }
 
-    /// Returns the time column of the trials. Empty for a usual one, or if the calibration was read from binary form.
+    /// Returns the time column of the trials. Empty if the column has a usual name, or if the calibration was read from
+    /// binary form.
     pub fn time(&self) -> &str {
         self.time.as_str()
     }

@@ -181,11 +181,11 @@ impl DataSet {
         Ok(write_whole(path, |out| out.write_all(text.as_bytes()))?)
     }
 
-    /// Writes a folder with `dataset.toml`, the rig file, and each trial as returned by `trial`,
-    /// completely or not at all, as [`write_folder`](crate::files::write_folder).
+    /// Writes a folder with `dataset.toml`, the rig file, and each trial as returned by `trial`. Like
+    /// [`write_folder`](crate::files::write_folder), it writes the folder completely or not at all.
     ///
     /// # Errors
-    /// As [`write_folder`](crate::files::write_folder), or an error of `trial`.
+    /// The errors of [`write_folder`](crate::files::write_folder), and those that `trial` returns.
     pub fn write_folder<E: From<DataError> + From<FileError>>(
         &self,
         folder: impl AsRef<Path>,

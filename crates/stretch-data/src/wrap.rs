@@ -9,7 +9,8 @@ use crate::{
 
 /// A step between two samples counts as a jump and not as motion if it is at least this fraction of a turn.
 const STEP: f64 = 0.25;
-/// Largest difference between a jump and a turn, in usual steps. The difference is the motion between the two samples.
+/// Largest difference between a jump and a turn, in multiples of the usual step. The difference is the motion between
+/// the two samples.
 const USUAL_STEPS: f64 = 3.0;
 /// Fraction of the steps that are not larger than a usual step.
 const USUAL: f64 = 0.99;

@@ -618,7 +618,7 @@ fn zeros(compilers: &[Compiler]) {
     ] {
         holds_with(name, calibration, Some(turns), Form::Float, compilers);
     }
-    // integers have no monitor of the zero
+    // the integer form does not monitor the zero
     holds_with("integers", &poly13, Some(turns), Form::Fixed, compilers);
 }
 

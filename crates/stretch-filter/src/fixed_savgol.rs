@@ -92,7 +92,7 @@ impl FixedSample for i32 {}
 /// assert_eq!(f64::from(last) * Rate::PER_SAMPLE, 38.0);
 /// ```
 ///
-/// A shape that does not fit does not compile:
+/// A shape whose moments overflow the integer type does not compile:
 /// ```compile_fail
 /// use stretch_core::Runner;
 /// use stretch_filter::FixedSgRate;

@@ -38,7 +38,7 @@ pub enum FitError {
     TooManyTerms {
         /// Terms of the degree.
         terms: usize,
-        /// Largest number of terms of the type.
+        /// Largest number of terms that the type can store.
         room: usize,
     },
     /// The requested degree has a term that the accumulated degree lacks.

@@ -16,9 +16,9 @@ impl<T: Real, const TERMS: usize> Fit<T, TERMS> {
     /// denotes the part.
     ///
     /// The scores of all parts sum to zero. If errors were white with variance `s^2`, the outer products `u u^T` of all
-    /// parts would sum to `s^2 I` on average. Their excess over it is the design effect of parts with correlated errors
-    /// (such as a day or a trial). Their sum is the middle factor of the sandwich estimator of Liang and Zeger
-    /// (doi 10.1093/biomet/73.1.13).
+    /// parts would sum to `s^2 I` on average. If errors are correlated within a part (such as a day or a trial), the
+    /// sum is larger; the ratio is the design effect. Their sum is the middle factor of the sandwich estimator of Liang
+    /// and Zeger (doi 10.1093/biomet/73.1.13).
     ///
     /// # Errors
     /// [`FitError::MissingTerm`] if the degrees differ.

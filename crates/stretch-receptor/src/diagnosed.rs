@@ -317,7 +317,7 @@ impl<T: Real> Diagnosed<T> {
         memory.covariance = [yy - gain_y * by_y, yr - gain_y * by_r, rr - gain_r * by_r];
         self.hold(memory);
         if self.slip > T::zero() {
-            // the signal of a gauge without memory
+            // `shown` is the signal that a gauge without memory would have
             let (bare, _) = self.curve.forward(here);
             let shown = bare + surprise;
             memory.shown = lag(memory.shown, shown, T::from_f64(SMOOTH));

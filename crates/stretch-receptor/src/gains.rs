@@ -55,7 +55,7 @@ impl Gains {
     }
 }
 
-/// The stationary gain for one slope.
+/// Returns the stationary Kalman gain for one slope of the curve.
 ///
 /// Source: structure-preserving doubling, Chu et al. 2004,
 /// doi:10.1080/00207170410001714988.

@@ -37,7 +37,7 @@ fn calibration(map: DiagnosedMap) -> Calibration {
         .expect("a map that holds together")
 }
 
-/// Returns a motion from rest at several speeds, with rests and turns.
+/// Returns a motion that starts at rest, has several speeds and contains rests and reversals.
 fn motion() -> Vec<f64> {
     let sum = |t: f64| 0.4 - 0.25 * (1.1 * t).cos() - 0.15 * (2.7 * t).cos();
     // forwards, a rest, and back the same way

@@ -104,7 +104,7 @@ fn soak<D, S, O>(
 ) -> f64
 where
     D: Design + Stage<S, Out = Result<O, Withheld>> + Copy,
-    // a type that is copied bit by bit owns nothing that could grow
+    // a `Copy` type owns no heap memory, so its size cannot grow
     D::Memory: Copy + Debug,
 {
     let (mut receptor, mut faults) = (Runner::new(design), Faults::new());

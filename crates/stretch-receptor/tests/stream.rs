@@ -127,7 +127,7 @@ proptest! {
         let mut other = Runner::new(StretchReceptor::<f64>::new(&falling).unwrap());
         for &volts in &stream {
             if let (Ok(a), Ok(b)) = (one.step(Volts(volts)), other.step(Volts(about - volts))) {
-                // at the very edge of the dead band a rounding may choose the other branch
+                // at the limit of the dead band, a rounding error may select the other branch
                 if a.branch == b.branch {
                     let (length, rate) = (180.0 * tolerance::FOLDED, 1e6 * tolerance::FOLDED);
                     prop_assert!(abs_diff_eq!(a.estimate, b.estimate, epsilon = length));
@@ -149,8 +149,8 @@ fn the_window_fills_before_the_first_reading() {
     assert_eq!(reading.branch, Branch::Inflation);
 }
 
-/// A line, and one curve for both branches, need no rate. Therefore they have an estimate at the first sample after a
-/// long gap.
+/// A line needs no rate, and one curve for both branches needs none either. Therefore they have an estimate at the
+/// first sample after a long gap.
 #[test]
 fn what_needs_the_signal_only_answers_from_the_first_sample() {
     let mut spec = example_calibration().into_spec();

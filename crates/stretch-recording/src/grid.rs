@@ -81,7 +81,7 @@ pub(crate) fn merged(
         find(file, &mut tracks, wanted)?;
     }
     for known in KNOWN {
-        // A known channel may be missing.
+        // The error is ignored, because a file need not contain every known channel.
         let _ = find(file, &mut tracks, known);
     }
     let tracks = tracks.into_iter().flat_map(|track| sparse(track, options, &mut notes));

@@ -151,7 +151,7 @@ impl Default for ReadOptions {
 }
 
 impl ReadOptions {
-    /// Returns the same options for one episode of a file that contains several.
+    /// Returns the same options with the number of the episode that is read from a file with several.
     pub(crate) fn of_episode(&self, episode: u32) -> Self {
         Self { episode: Some(episode), ..self.clone() }
     }

@@ -125,7 +125,7 @@ fn is_mat(head: &[u8]) -> bool {
         || matches!(head.get(124..128), Some([0, 1, b'I', b'M'] | [1, 0, b'M', b'I']))
 }
 
-/// Reads the first bytes of a stream, and returns them with the format that they show.
+/// Reads the first bytes of a stream, and returns them with the format that was recognised from them.
 pub(crate) fn head(reader: &mut dyn Read, file: &str) -> Result<(Vec<u8>, Format), RecordingError> {
     let mut head = Vec::with_capacity(HEAD_BYTES);
     let read = reader.take(HEAD_BYTES as u64).read_to_end(&mut head);

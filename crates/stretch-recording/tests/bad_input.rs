@@ -174,7 +174,7 @@ fn rows_and_time() {
     );
 }
 
-/// A stream of a gigabyte without a line end, which counts the bytes that are left.
+/// A stream that returns `head` and then, without a line end, `left` further bytes.
 struct Endless {
     left: u64,
     head: &'static [u8],

@@ -121,7 +121,7 @@ fn a_rate_above_the_table_is_taken_where_there_is_no_time() {
     assert!(notes.contains(
         &"there is no time column: the time is computed from a rate of 50 Hz, as given by Increment above the table".to_owned()
     ));
-    // A rate that is given replaces the rate in the file.
+    // A rate in the options replaces the rate in the file.
     let Recording { trial, .. } =
         Recording::from_reader(scope.as_bytes(), "t", &ReadOptions::new().sample_rate_hz(10.0))
             .expect("read");

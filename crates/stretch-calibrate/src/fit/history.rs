@@ -50,7 +50,7 @@ pub struct StateDesign {
     pub memory_degree: u8,
 }
 
-/// A design in which memory states reach the full degree.
+/// Returns a design in which terms may contain memory states up to the full degree.
 const fn design(relaxations_s: &'static [f64], radii: &'static [f64], degree: u8) -> StateDesign {
     StateDesign { relaxations_s, radii, degree, memory_degree: degree }
 }

@@ -274,7 +274,7 @@ fn spread<'a>(
     (sum / f64::from(count)).sqrt()
 }
 
-/// Returns the map with the statistics of its estimates, which the live receptor computes.
+/// Runs the live receptor on the data and returns the map with the error statistics of these estimates.
 fn judged(prepared: &Prepared, forward: &Forward) -> Result<ObserverMap, CalibrateError> {
     let sign = prepared.polarity.sign();
     let curve: Vec<f64> = forward.curve.iter().map(|v| sign * v).collect();

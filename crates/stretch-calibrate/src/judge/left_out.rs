@@ -124,7 +124,7 @@ pub fn judge_model(
     Ok(Judged { parameters, errors })
 }
 
-/// Returns which trials reverse. A table never does, because its rows have no order.
+/// Returns in which trials the reference reverses. In a table it never does, because the rows have no order.
 pub(crate) fn turning(trials: &[Trial], options: &Options) -> Result<Vec<bool>, CalibrateError> {
     let one = |trial: &Trial| Ok(!options.is_table && reverses(trial.require(&options.reference)?));
     trials.iter().map(one).collect()

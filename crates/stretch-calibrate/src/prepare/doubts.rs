@@ -252,7 +252,7 @@ pub fn without_clipped(
     let one = |trial: Trial| {
         let mut kept = trial;
         let all = kept.len();
-        // There are two ends.
+        // The signal may be clipped at both ends of its range.
         for _ in 0..2 {
             let Some(end) = held(&kept, [signal, reference], |held| held.stands_at()) else {
                 break;

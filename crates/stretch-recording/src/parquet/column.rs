@@ -15,7 +15,7 @@ use crate::room::Room;
 
 /// Number of rows that are read at once.
 const PIECE: usize = 1 << 16;
-/// Longest list whose numbers become channels.
+/// Greatest length of the lists in a column whose items become one channel each.
 const LONGEST: usize = 64;
 /// Memory, in bytes, that each number of a list takes while it is read. It covers two copies of the number, its two
 /// Parquet levels and the index at which its list begins, in vectors that may have grown to twice their length.

@@ -72,7 +72,7 @@ pub fn array_bytes<const N: usize>(
     stored(calibration)
 }
 
-/// Returns the seal of the calibration of several gauges: CRC-32C of [`array_bytes`].
+/// Returns the seal (checksum) of the calibration of several gauges: the CRC-32C of [`array_bytes`].
 ///
 /// # Errors
 /// Never, as [`array_bytes`].
@@ -265,7 +265,7 @@ pub struct RecordSummary {
     pub kind: String,
     /// CRC-32C of the calibration's bytes in postcard.
     pub seal: u32,
-    /// Whether the file itself carries a seal. Files of schema 1 carry no seal.
+    /// Whether the file contains this checksum. Files of schema 1 do not.
     pub is_sealed: bool,
 }
 

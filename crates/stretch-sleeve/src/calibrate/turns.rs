@@ -21,7 +21,8 @@ use super::{
 const FALSE_SHARE: f64 = 0.01;
 /// Shortest time without the end of a movement that counts as a pause, s. Putting a sensor on again takes longer.
 const LEAST_PAUSE_S: f64 = 4.0;
-/// Shortest pause, in median times between the ends of movements, so that a slow movement is not a pause.
+/// Shortest pause, in multiples of the median time between the ends of movements. A slow movement is shorter and does
+/// not count as a pause.
 const LEAST_PAUSE: f64 = 4.0;
 /// Smallest span of a movement, as a share of the signal's range without the lowest and highest 5 % of the samples.
 const LEAST_SPAN: f64 = 1.0 / 3.0;
@@ -316,7 +317,8 @@ fn slope(calibration: &Calibration, level: f64, ends: Interval) -> Option<f64> {
     Some((held(to)? - held(from)?) / (to - from)).filter(|slope| slope.is_finite())
 }
 
-/// Returns the same calibration without a baseline. A baseline would follow a constant signal.
+/// Returns the same calibration without a baseline, because a baseline would follow the constant signals that are used
+/// here.
 fn without_rest(calibration: &Calibration) -> Option<Calibration> {
     let mut spec = calibration.clone().into_spec();
     match &mut spec.model {

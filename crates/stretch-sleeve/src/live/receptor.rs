@@ -30,10 +30,10 @@ use super::{
 /// 2. The states of each channel are computed, each shifted and scaled into its domain.
 /// 3. The gains for the remaining channels are selected: for all, for all but one, or for the best single channel.
 ///
-/// A missing sample, or one outside the possible range, is replaced by the channel's last one. If the samples of all
-/// channels in use are missing, the recorder is at fault and no channel counts as lost: up to [`MAX_BRIDGED`] such
-/// samples are bridged, and there is no reading for further ones. Cost: two products and two sums for each term of a
-/// channel in use.
+/// A sample that is missing or outside the possible range is replaced by the channel's last valid sample. If the
+/// samples of all channels in use are missing, the recorder is at fault and no channel counts as lost: up to
+/// [`MAX_BRIDGED`] such samples are bridged, and there is no reading for further ones. Cost: two products and two sums
+/// for each term of a channel in use.
 ///
 /// ```
 /// use stretch_core::{Runner, Stage};

@@ -231,7 +231,7 @@ impl<T: Real> ZeroWatch<T> {
         sample - self.sign * memory.followed
     }
 
-    /// Takes a number of missing samples.
+    /// Adds a number of missing samples to the sample count.
     pub fn lose(&self, memory: &mut ZeroMemory<T>, samples: u32) {
         memory.samples = memory.samples.wrapping_add(samples);
     }

@@ -205,7 +205,8 @@ impl Session {
     }
 }
 
-/// Returns the largest change of the zero of a single gauge, for a model of this target.
+/// Returns the largest change of the zero within the session, as [`turns::zero_move`]. Returns `None` if there are
+/// several gauges.
 fn zero_move(channels: &Channels, target: Target) -> Option<f64> {
     let stretches = channels.stretches.iter();
     let signals: Option<Vec<&[f64]>> =

@@ -365,7 +365,7 @@ mod tests {
         near(spread.noise.sqrt(), 0.1);
     }
 
-    /// Leaving a session out of the messages must give the result of a tree without the session.
+    /// If the messages from a session are left out, the result must equal that of a tree without the session.
     #[test]
     fn a_session_left_out_of_the_messages_is_one_that_was_never_there() {
         let mut random = ChaCha8Rng::seed_from_u64(12);

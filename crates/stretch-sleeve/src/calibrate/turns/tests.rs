@@ -22,15 +22,15 @@ enum Scatter {
     Amplitudes,
     /// Movements that begin and end anywhere within 4 mm.
     Uniform,
-    /// Student's t of three degrees of freedom, 1 mm.
+    /// Both ends with Student's t distribution of three degrees of freedom, scaled by 1 mm.
     Student,
-    /// One-sided: exponential, 1 mm.
+    /// Both ends with a one-sided exponential distribution, scaled by 1 mm.
     OneSided,
     /// Rests and end stops within 0.01 mm; about a third of the ends lie anywhere within 10 mm of them.
     Partial,
     /// Normal, with a correlation of 0.5 with the previous movement.
     Alike,
-    /// Normal about a zero that makes a random walk of 0.3 mm a movement.
+    /// Normal about a zero that performs a random walk with steps of 0.3 mm per movement.
     Walk,
 }
 
@@ -174,7 +174,7 @@ fn a_zero_without_a_shift_is_seldom_reported() {
     }
 }
 
-/// A gauge is put on again 8 mm off after 200 movements.
+/// After 200 movements the gauge is put on again, shifted by 8 mm.
 #[test]
 fn a_shift_across_a_pause_is_reported_at_the_fifth_movement() {
     for scatter in STEADY {

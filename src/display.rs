@@ -91,7 +91,7 @@ pub(crate) fn say(text: impl Display) -> anyhow::Result<()> {
 /// Prints the main result, in bold if the terminal supports it.
 ///
 /// # Errors
-/// Never, as [`say`].
+/// Never: see [`say`].
 pub(crate) fn say_first(text: impl Display) -> anyhow::Result<()> {
     let text = wrapped(&plain(&text.to_string()));
     match TAKEN.load(SeqCst) {
@@ -108,7 +108,7 @@ const MOST_LINES: usize = 15;
 /// come last.
 ///
 /// # Errors
-/// Never, as [`say`].
+/// Never: see [`say`].
 pub(crate) fn say_below<'a>(
     blocks: impl IntoIterator<Item = String>,
     written: impl IntoIterator<Item = &'a Path>,
@@ -143,7 +143,7 @@ pub(crate) fn say_below<'a>(
 /// Prints a result that other programs read, without wrapping: code, JSON, TOML.
 ///
 /// # Errors
-/// Never, as [`say`].
+/// Never: see [`say`].
 pub(crate) fn say_as_is(text: impl Display) -> anyhow::Result<()> {
     let text = plain(&text.to_string());
     if TAKEN.load(SeqCst) {
@@ -162,7 +162,7 @@ fn write_out(text: &str) -> anyhow::Result<()> {
 /// Reports an additional action, such as a file that was written. Silent with `-q`.
 ///
 /// # Errors
-/// Never, as [`say`].
+/// Never: see [`say`].
 pub(crate) fn tell(text: impl Display) -> anyhow::Result<()> {
     if volume() == Volume::Quiet { Ok(()) } else { say(text) }
 }

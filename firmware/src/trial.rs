@@ -4,7 +4,7 @@ use stretch_receptor::code::AdcCode;
 
 static CODES: &[u8] = include_bytes!("../data/trial.u16le");
 
-/// Volts per code: 3.3 V over 4095.
+/// Volts per code: 3.3 V divided by 4095.
 pub const VOLTS_PER_CODE: f32 = 3.3 / 4095.0;
 
 /// Returns the codes in order. The value 0xffff is a missing sample.

@@ -73,10 +73,10 @@ impl Json {
         self.file().map_or(Ok(()), |path| tell(format!("wrote {}", path.display())))
     }
 
-    /// Prints the result of a command that writes no other file, as [`Json::conclude`].
+    /// Prints the result of a command that writes no other file, as [`Json::conclude`] does.
     ///
     /// # Errors
-    /// As [`Json::conclude`].
+    /// The errors of [`Json::conclude`].
     pub(crate) fn answer(
         &self,
         value: &impl Serialize,

@@ -84,7 +84,7 @@ pub fn load<'r, T: Deserialize<'r>>(bytes: &'r [u8]) -> Result<T, DesignError> {
 /// Checks the checksum at the end of a binary calibration and returns it; `None` for schema 1.
 ///
 /// # Errors
-/// Those of [`load`], except that the bytes of the value are not checked.
+/// The errors of [`load`], except that the bytes of the value are not checked.
 pub fn seal(bytes: &[u8]) -> Result<Option<u32>, DesignError> {
     let body = body(bytes)?;
     Ok((body.len() < bytes.len()).then(|| checksum(body)))

@@ -133,8 +133,8 @@ pub struct EvenSession {
 }
 
 impl EvenSession {
-    /// Resamples columns of trials to one uniform grid, as [`Trial::even`]. The first trial's rate
-    /// is the session's rate.
+    /// Resamples columns of trials to one uniform grid, as [`Trial::even`] does. The first trial's rate is the
+    /// session's rate.
     ///
     /// Trials are sorted by `start_s`. If start times are equal, the given order is kept, and pauses of 15 s are
     /// assumed. Gaps of up to half a second are bridged if the commands are equal on both sides. A gap during which a

@@ -135,7 +135,7 @@ impl RigFile {
     /// Parses the text of a rig file; messages call the file `name`.
     ///
     /// # Errors
-    /// As [`RigFile::read`].
+    /// The errors of [`RigFile::read`].
     ///
     /// ```
     /// use stretch_data::RigFile;
@@ -156,7 +156,7 @@ impl RigFile {
     /// Writes the rig file, completely or not at all. Numbers read back to the same bits.
     ///
     /// # Errors
-    /// As [`write_whole`].
+    /// The errors of [`write_whole`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), DataError> {
         Ok(write_whole(path, |out| out.write_all(self.to_toml().as_bytes()))?)
     }

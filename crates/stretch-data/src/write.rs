@@ -13,7 +13,7 @@ impl Trial {
     /// Numbers are written with the fewest digits that read back to the same bits.
     ///
     /// # Errors
-    /// As [`Trial::check`] and [`write_whole`].
+    /// The errors of [`Trial::check`] and [`write_whole`].
     pub fn write(&self, path: impl AsRef<Path>) -> Result<(), DataError> {
         self.check()?;
         Ok(write_whole(path, |out| self.write_rows(out))?)
@@ -22,7 +22,7 @@ impl Trial {
     /// Writes the trial to a stream, which should be buffered.
     ///
     /// # Errors
-    /// As [`Trial::check`], otherwise [`DataError::File`].
+    /// The errors of [`Trial::check`], otherwise [`DataError::File`].
     pub fn write_to(&self, mut out: impl Write) -> Result<(), DataError> {
         self.check()?;
         self.write_rows(&mut out).map_err(|e| DataError::io(&self.name, "write it", e))

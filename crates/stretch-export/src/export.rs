@@ -131,7 +131,7 @@ pub fn header(calibration: &Calibration, options: &Options) -> Result<Header, Ex
 /// contains the levels at which movements turn.
 ///
 /// # Errors
-/// As [`header`].
+/// The errors of [`header`].
 pub fn gauge_header(gauge: &GaugeCalibration, options: &Options) -> Result<Header, ExportError> {
     one(gauge.calibration(), gauge.turns(), options)
 }

@@ -761,7 +761,7 @@ fn a_branch_is_the_direction_of_the_reference() {
 }
 
 /// A file that includes one header twice compiles. A file that includes the headers of two calibrations, of two forms
-/// or of two converters does not, because the second header would be left out.
+/// or of two converters does not compile, because otherwise the second header would be skipped without a message.
 #[test]
 fn a_second_header_in_a_file_is_an_error_that_says_what_to_do() {
     let folder = tempfile::tempdir().unwrap();

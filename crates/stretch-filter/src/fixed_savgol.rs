@@ -184,7 +184,7 @@ impl<S: FixedSample, const WINDOW: usize, const DEGREE: usize, const DELAY: usiz
     /// Bound on the magnitude of the output for any samples.
     pub const LARGEST: i32 = ((Self::TAPS.total * S::LARGEST) >> Self::SHIFT) as i32 + 1;
 
-    /// Creates the filter. All its constants belong to its type.
+    /// Creates the filter. It stores no numbers, because all constants belong to its type.
     #[must_use]
     pub const fn new() -> Self {
         let _ = Self::TAPS; // the shape is checked here at the latest

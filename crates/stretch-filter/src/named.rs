@@ -5,8 +5,9 @@ use stretch_core::{RateEstimator, SampleRate};
 /// A filter design that computes the rate of a signal, and knows under which name and parameters a calibration stores
 /// it.
 ///
-/// A receptor refuses a design if its calibration was fitted with another estimator. For a design of your own, which no
-/// calibration can name, implement the trait without its function; the receptor then does not compare.
+/// A receptor refuses a design if its calibration was fitted with another estimator. No calibration can name a design
+/// of your own: for it, write an empty implementation of the trait, and the receptor then accepts the design without
+/// this check.
 ///
 /// ```
 /// use stretch_core::{RateEstimator, SampleRate};

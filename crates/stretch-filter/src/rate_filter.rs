@@ -91,7 +91,7 @@ impl<T: Real, const CAP: usize> RateFilter<T, CAP> {
             RateEstimator::Tracker { tracking_index } => {
                 Kind::Tracker(Tracker::new(TrackerSpec { tracking_index, sample_rate })?)
             }
-            // The central difference, and estimators that a later version may add.
+            // This refuses the central difference, and estimators that a later version may add.
             _ => return Err(FilterError::LooksAhead { samples: 1 }),
         };
         Ok(Self { kind, estimator, sample_rate })

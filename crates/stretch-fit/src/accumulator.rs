@@ -116,7 +116,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// not change the degrees of freedom, which are samples minus terms.
     ///
     /// # Errors
-    /// As for [`push`](Self::push); also for a weight below zero, or so large
+    /// The errors of [`push`](Self::push); also for a weight below zero, or so large
     /// that weight times a squared power overflows.
     pub fn push_weighted(&mut self, sample: Sample<T>, weight: T) -> Result<(), FitError> {
         if !self.takes(sample) {
@@ -174,7 +174,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// Adds samples up to the first one that is refused.
     ///
     /// # Errors
-    /// As for [`push`](Self::push).
+    /// The errors of [`push`](Self::push).
     pub fn extend(&mut self, samples: impl IntoIterator<Item = Sample<T>>) -> Result<(), FitError> {
         samples.into_iter().try_for_each(|sample| self.push(sample))
     }
@@ -183,7 +183,7 @@ impl<T: Real, const TERMS: usize, const ROWS: usize> SurfaceAccumulator<T, TERMS
     /// added. The result has the same bits as with [`push`](Self::push), but this is faster.
     ///
     /// # Errors
-    /// As for [`push`](Self::push), for the first sample that is refused.
+    /// The errors of [`push`](Self::push), for the first sample that is refused.
     ///
     /// ```
     /// use stretch_core::Degree;

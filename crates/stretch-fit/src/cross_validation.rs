@@ -140,7 +140,7 @@ pub struct CrossValidation<T> {
 /// ```
 ///
 /// # Errors
-/// As for [`held_out`], for the first trial that fails.
+/// The errors of [`held_out`], for the first trial that fails.
 pub fn cross_validate<T: Real, const TERMS: usize>(
     trials: &[Factor<T, TERMS>],
     degree: Degree,

@@ -391,7 +391,7 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     /// Fits a surface of a degree within the accumulated one, like [`fit`](Self::fit).
     ///
     /// # Errors
-    /// As for [`restrict`](Self::restrict) and [`fit`](Self::fit).
+    /// The errors of [`restrict`](Self::restrict) and [`fit`](Self::fit).
     pub fn fit_degree(&self, degree: Degree) -> Result<Fit<T, TERMS>, FitError> {
         self.restrict(degree)?.fit()
     }
@@ -418,8 +418,8 @@ impl<T: Real, const TERMS: usize> Factor<T, TERMS> {
     }
 }
 
-/// Returns the norm of a column of the design matrix. Reflections preserve it, so it is the norm of the triangle's
-/// column.
+/// Returns the norm of a column of the design matrix. Reflections preserve the norm, so it equals the norm of the
+/// triangle's column.
 fn column_norm<T: Real, const TERMS: usize>(triangle: &[[T; TERMS]; TERMS], k: usize) -> T {
     let largest = (0..=k).fold(T::zero(), |most, m| most.max(triangle[m][k].abs()));
     if largest == T::zero() {

@@ -113,7 +113,7 @@ impl<T: Real> OrderTable<T> {
     /// were not accumulated for gets an error instead of a row.
     ///
     /// # Errors
-    /// As [`new`](Self::new).
+    /// The errors of [`new`](Self::new).
     ///
     /// ```
     /// use stretch_core::Degree;

@@ -95,7 +95,7 @@ pub struct RobustFit<T> {
 /// ```
 ///
 /// # Errors
-/// As for [`SurfaceAccumulator::push`] and [`SurfaceAccumulator::fit`]; [`FitError::ShortMemory`]
+/// The errors of [`SurfaceAccumulator::push`] and [`SurfaceAccumulator::fit`]; [`FitError::ShortMemory`]
 /// if `memory` is shorter than the number of samples; [`FitError::TooFewSamples`] if no degree of
 /// freedom is left; [`FitError::RankDeficient`] also if the samples with non-zero weight cannot
 /// determine a term.

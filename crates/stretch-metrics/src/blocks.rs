@@ -124,7 +124,7 @@ impl<T: Real> PairedBlocks<T> {
     /// Tests the hypothesis that the mean difference is 0 on the block means.
     ///
     /// # Errors
-    /// As for [`PairedT::test`], with blocks in place of pairs.
+    /// The errors of [`PairedT::test`], with blocks in place of pairs.
     pub fn test(&self) -> Result<TTest, MetricsError> {
         self.test.test()
     }

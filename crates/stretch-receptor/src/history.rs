@@ -79,7 +79,7 @@ impl<T: Real, R> HistoryReceptor<T, R> {
     /// A receptor for `calibration`, with a rate estimator for the estimate.
     ///
     /// # Errors
-    /// As [`StretchReceptor::with_rate`](crate::StretchReceptor::with_rate).
+    /// The errors of [`StretchReceptor::with_rate`](crate::StretchReceptor::with_rate).
     pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError>
     where
         R: NamedRate,

@@ -75,7 +75,7 @@ impl<T: Real, R> Receptor<T, R> {
     /// A receptor for `calibration`, with a rate estimator built for it.
     ///
     /// # Errors
-    /// As [`StretchReceptor::with_rate`]. Models without a rate estimator do not use `rate`.
+    /// The errors of [`StretchReceptor::with_rate`]. Models without a rate estimator do not use `rate`.
     pub fn with_rate(calibration: &Calibration, rate: R) -> Result<Self, ReceptorError>
     where
         R: NamedRate,

@@ -26,7 +26,7 @@ impl Recording {
     /// Reads a trial of a data set from the bytes of its file, without a folder.
     ///
     /// # Errors
-    /// As [`Recording::of_entry`].
+    /// The errors of [`Recording::of_entry`].
     pub fn of_bytes(
         entry: &TrialEntry,
         bytes: &[u8],
@@ -39,7 +39,7 @@ impl Recording {
     /// Reads every trial of a data set from its folder.
     ///
     /// # Errors
-    /// As [`Recording::of_entry`].
+    /// The errors of [`Recording::of_entry`].
     pub fn session(
         set: &DataSet,
         folder: impl AsRef<Path>,
@@ -51,7 +51,7 @@ impl Recording {
     /// Reads every trial of a data set with the function `read`, for files that are not in a folder.
     ///
     /// # Errors
-    /// Those of `read`.
+    /// The errors that `read` returns.
     ///
     /// ```
     /// use stretch_data::{DataSet, Split};

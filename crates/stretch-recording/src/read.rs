@@ -64,7 +64,7 @@ impl Recording {
     /// Reads a recording from any stream; messages call it `name`.
     ///
     /// # Errors
-    /// As [`Recording::read`].
+    /// The errors of [`Recording::read`].
     pub fn from_reader(
         mut reader: impl Read,
         name: &str,

@@ -96,7 +96,7 @@ pub(crate) fn calibrate_with(
     Ok((Calibrated { calibration, fits, doubts, notes }, made))
 }
 
-/// What the fit of a model with memory chooses, such as time constants. A fit to a part of the same data uses the same
+/// Choices of the fit of a model with memory, such as time constants. A fit to a part of the same data uses the same
 /// choices again.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Choice {

@@ -33,7 +33,7 @@ const STEADY_S: [f64; 3] = [0.15, 0.5, 3.0];
 /// Acceptance criterion: a more complex alternative is kept if its error is below this share of the simpler one's.
 const ACCEPTED: f64 = 0.97;
 
-/// What a fit chooses. If a fit is given such choices, it starts from them.
+/// Choices of a fit. If a fit is given such choices, it starts from them.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DiagnosedChoice {
     at: Vec<f64>,

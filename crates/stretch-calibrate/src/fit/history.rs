@@ -178,7 +178,7 @@ impl TermRows {
     }
 }
 
-/// What a fit chooses. If a fit is given such choices, it uses them and chooses nothing itself.
+/// Choices of a fit. If a fit is given such choices, it uses them and chooses nothing itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct HistoryChoice {
     pub(crate) design: StateDesign,

@@ -25,7 +25,7 @@ const LEAST_ANSWER: f64 = 0.1;
 /// Window of the quadratic filter that smooths the reference, in samples.
 const SMOOTH: usize = 7;
 
-/// What a fit chooses. If a fit is given such choices, it uses them and chooses nothing itself.
+/// Choices of a fit. If a fit is given such choices, it uses them and chooses nothing itself.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct ObserverChoice {
     pub(crate) taus: [Option<f64>; 2],

@@ -111,8 +111,8 @@ fn with_unit(x: f64, unit: &str) -> String {
 const ALIKE: f64 = 1.25;
 
 /// Returns a doubt if the estimates of a trial are shifted. Two conditions must hold. First, the mean error exceeds 5 %
-/// of the range, or both 1 % of the range and five times the error of the fit. Second, the mean error is most of the
-/// error, or without it the error is about that of the fit:
+/// of the range, or both 1 % of the range and five times the error of the fit. Second, the mean error is at least half
+/// of the mean square, or the error without the mean error is about that of the fit:
 ///
 /// ```text
 /// |bias| > min(0.05 range, max(0.01 range, 5 fit))  and

@@ -159,7 +159,7 @@ pub fn evaluate(
 /// Evaluates calibrations as [`evaluate`] does, but without lags, whose search takes most of the time.
 ///
 /// # Errors
-/// As [`evaluate`].
+/// The errors of [`evaluate`].
 pub fn evaluate_errors(
     calibrations: &[(&str, &Calibration)],
     trials: &[Trial],
@@ -195,7 +195,7 @@ fn evaluate_lag(
 /// and its reference.
 ///
 /// # Errors
-/// Those of `estimates`, and as [`evaluate`].
+/// The errors of [`evaluate`], and those that `estimates` returns.
 pub fn evaluate_methods(
     all: &Methods<'_>,
     trials: &[Trial],

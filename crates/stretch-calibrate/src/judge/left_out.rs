@@ -87,7 +87,7 @@ pub(crate) struct Errors {
 /// Cross-validates one model as [`choose_model`](crate::choose_model) does.
 ///
 /// # Errors
-/// As [`calibrate`](crate::calibrate).
+/// The errors of [`calibrate`](crate::calibrate).
 pub fn judge_model(
     trials: &[Trial],
     options: &Options,

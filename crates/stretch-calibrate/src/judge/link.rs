@@ -54,16 +54,17 @@ impl Twin {
         }
     }
 
-    /// A calibration for a board's converter, which states neither names nor units.
+    /// Uses an integer calibration that was made for a board's converter. Such a calibration contains neither names nor
+    /// units.
     pub fn of_board(receptor: BoardReceptor) -> Self {
         let remembers = receptor.remembers();
         Self { remembers, receptor: Own::Codes(Box::new(receptor)), ..Self::none() }
     }
 
-    /// A calibration. One whose rate estimator needs the next sample has no live estimates.
+    /// Uses a calibration. If its rate estimator needs the next sample, there are no live estimates.
     ///
     /// # Errors
-    /// A calibration that cannot run live for another reason.
+    /// Fails if the calibration cannot run live for another reason.
     pub fn new(calibration: &Calibration) -> Result<Self, ReceptorError> {
         let spec = calibration.spec();
         let receptor = match (Receptor::new(calibration), spec.rate_estimator) {
@@ -86,7 +87,8 @@ impl Twin {
         !matches!(self.receptor, Own::Silent)
     }
 
-    /// The header of the lines of [`LinkSample::push_line`], with the names of the calibration.
+    /// Returns the CSV header for the lines that [`LinkSample::push_line`] writes, with the column names of the
+    /// calibration.
     pub fn header(&self) -> String {
         let estimate = match self.unit.as_str() {
             "" => "estimate".to_owned(),
@@ -302,12 +304,13 @@ impl Link {
         Self { decoder: Decoder::new(), time_line, adc, twin, is_whole: false, status }
     }
 
-    /// The header of the lines of its samples.
+    /// Returns the CSV header for the samples of this link.
     pub fn header(&self) -> String {
         self.twin.header()
     }
 
-    /// The samples in bytes that arrived at a time of the computer's clock, s.
+    /// Decodes bytes that arrived at the time `now_s` of the computer's clock, s, and returns the samples that they
+    /// complete.
     pub fn take(&mut self, bytes: &[u8], now_s: f64) -> Vec<LinkSample> {
         let mut samples = Vec::new();
         for &byte in bytes {

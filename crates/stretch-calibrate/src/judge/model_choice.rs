@@ -96,10 +96,11 @@ pub fn choose_model(trials: &[Trial], options: &Options) -> Result<ModelChoice, 
     choose_model_watched(trials, options, &|_, _| {})
 }
 
-/// Chooses a model as [`choose_model`] does, and reports after each candidate how many of how many have been judged.
+/// Chooses a model as [`choose_model`] does. After each candidate, reports how many candidates have been judged, and
+/// how many there are.
 ///
 /// # Errors
-/// As [`choose_model`].
+/// The errors of [`choose_model`].
 pub fn choose_model_watched(
     trials: &[Trial],
     options: &Options,
@@ -364,8 +365,8 @@ pub struct Candidate {
     pub problem: Option<String>,
 }
 
-/// Ranks signals by their cross-validated error with the model of `options`, best first; with poly13 for a model with
-/// memory.
+/// Ranks signals by their cross-validated error with the model of `options`, best first. If that model has a memory,
+/// poly13 is used in its place.
 ///
 /// The folds are trials (at most sixteen folds), or tenths of the data if there are fewer than three trials.
 ///

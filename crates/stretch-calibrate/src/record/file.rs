@@ -64,7 +64,7 @@ pub fn read_calibration(path: &Path) -> Result<Calibration, CalibrateError> {
 /// Reads a calibration from JSON text. Messages call the text `name`.
 ///
 /// # Errors
-/// As [`read_calibration`].
+/// The errors of [`read_calibration`].
 ///
 /// ```
 /// use stretch_calibrate::{calibration_from_json, calibration_to_json};
@@ -85,7 +85,7 @@ pub fn calibration_from_json(text: &str, name: &str) -> Result<Calibration, Cali
 /// Reads a calibration from JSON text that may have been edited by hand. Its digest is not checked.
 ///
 /// # Errors
-/// As [`read_calibration`], except for the digest.
+/// The errors of [`read_calibration`], except for the digest.
 pub fn calibration_from_edited_json(text: &str, name: &str) -> Result<Calibration, CalibrateError> {
     from_json(text, name, Seal::Ignored)
 }

@@ -158,7 +158,7 @@ pub fn converter_reach(
     let codes = (max - min) / adc.volts_per_code();
     // differences of up to a hundredth of the range cause no note
     let beyond = (zero_v - min).max(max - full_scale_v) > 0.01 * (max - min);
-    // A converter cannot have given counts that it does not have.
+    // A signal in counts beyond the codes of this converter was recorded with another converter.
     let is_outside = max < zero_v || full_scale_v < min || (beyond && adc.is_in_counts());
     if is_outside || codes < LEAST_CODES {
         let few = match is_outside {

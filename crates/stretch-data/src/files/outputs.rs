@@ -114,7 +114,7 @@ impl Outputs {
     /// immediately.
     ///
     /// # Errors
-    /// Those of [`write_whole`]; also if two files have the same name.
+    /// The errors of [`write_whole`], and an error if two files have the same name.
     pub fn file(
         &mut self,
         path: impl AsRef<Path>,
@@ -169,10 +169,10 @@ impl Outputs {
         Ok(())
     }
 
-    /// Writes a folder next to its target, as [`write_folder`].
+    /// Writes a folder next to its target, as [`write_folder`] does.
     ///
     /// # Errors
-    /// As [`write_folder`], or an error of `fill`.
+    /// The errors of [`write_folder`], and those that `fill` returns.
     pub fn folder<E: From<FileError>>(
         &mut self,
         path: impl AsRef<Path>,

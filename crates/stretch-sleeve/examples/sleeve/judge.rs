@@ -51,8 +51,8 @@ pub(crate) struct Priors {
     each: Vec<Prior>,
 }
 
-/// Makes a prior from all sessions that the prior accepts. It refuses, for example, a session with a signal that falls
-/// if the signal rises in other sessions.
+/// Makes a prior from the sessions. Sessions that are refused, for example because a signal falls that rises in other
+/// sessions, are left out.
 fn of_accepted(
     mut sessions: Vec<Session>,
     make: impl Fn(&[Session]) -> Result<Prior, SleeveError>,

@@ -24,7 +24,7 @@ impl LiveGauge {
     /// Creates a receptor for a calibration whose rate estimator can run live.
     ///
     /// # Errors
-    /// As [`LiveReceptor::new`].
+    /// The errors of [`LiveReceptor::new`].
     pub fn new(gauge: &GaugeCalibration) -> Result<Self, CalibrateError> {
         let spec = gauge.calibration().spec();
         let watch = gauge.turns().map(|turns| {
@@ -109,7 +109,7 @@ pub struct AppliedGauge {
 /// a slow drift of the signal's zero ([`LiveGauge::following`]).
 ///
 /// # Errors
-/// As [`apply`] and [`LiveGauge::following`].
+/// The errors of [`apply`] and [`LiveGauge::following`].
 pub fn apply_gauge(
     gauge: &GaugeCalibration,
     trial: &Trial,

@@ -75,7 +75,7 @@ pub fn array_bytes<const N: usize>(
 /// Returns the seal (checksum) of the calibration of several gauges: the CRC-32C of [`array_bytes`].
 ///
 /// # Errors
-/// Never, as [`array_bytes`].
+/// Never: see [`array_bytes`].
 pub fn array_seal<const N: usize>(
     calibration: &ArrayCalibration<N>,
 ) -> Result<u32, CalibrateError> {
@@ -117,7 +117,7 @@ impl GaugeCalibration {
     /// Reads the calibration from a JSON text. Messages call it `name`.
     ///
     /// # Errors
-    /// As [`read`](Self::read).
+    /// The errors of [`read`](Self::read).
     pub fn from_json(text: &str, name: &str) -> Result<Self, CalibrateError> {
         Self::with_turns_of(text, name, calibration_from_json(text, name)?)
     }
@@ -173,7 +173,7 @@ impl SleeveCalibration {
     /// otherwise JSON.
     ///
     /// # Errors
-    /// Never, as [`GaugeCalibration::bytes`].
+    /// Never: see [`GaugeCalibration::bytes`].
     pub fn bytes(&self, path: &Path) -> Result<Vec<u8>, CalibrateError> {
         match self {
             Self::One(gauge) => gauge.bytes(path),
@@ -186,7 +186,7 @@ impl SleeveCalibration {
     /// the calibration alone.
     ///
     /// # Errors
-    /// Never, as [`bytes`](Self::bytes).
+    /// Never: see [`bytes`](Self::bytes).
     pub fn seal(&self) -> Result<u32, CalibrateError> {
         match self {
             Self::One(gauge) => calibration_seal(gauge.calibration()),
@@ -272,7 +272,7 @@ pub struct RecordSummary {
 /// Describes a calibration file, or a file that `--fixed` wrote for a board.
 ///
 /// # Errors
-/// As [`SleeveCalibration::read`].
+/// The errors of [`SleeveCalibration::read`].
 pub fn describe_record(path: &Path) -> Result<RecordSummary, CalibrateError> {
     let bytes = read_whole(path).unwrap_or_default();
     if let Some(receptor) = BoardReceptor::new(&bytes)

@@ -76,7 +76,7 @@ pub fn apply_array(
 /// outside the domain if a state was clamped.
 ///
 /// # Errors
-/// As [`evaluate`](stretch_calibrate::evaluate()).
+/// The errors of [`evaluate`](stretch_calibrate::evaluate()).
 ///
 /// ```
 /// use stretch_data::{Channel, Trial};

@@ -163,7 +163,7 @@ impl Prior {
     /// earlier sessions.
     ///
     /// # Errors
-    /// As [`Prior::learn`].
+    /// The errors of [`Prior::learn`].
     pub fn knowing(&self, sessions: &[Session]) -> Result<Self, SleeveError> {
         check_all(sessions)?;
         let undetermined = || CalibrateError::Undetermined { model: "prior".into() };

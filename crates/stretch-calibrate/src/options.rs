@@ -322,7 +322,7 @@ const BRIDGE_ZERO_V: f64 = 1.24;
 pub struct Cause {
     /// The effect.
     pub effect: String,
-    /// Its parameters by name.
+    /// Parameters of the effect, by name.
     pub values: Vec<(String, f64)>,
 }
 

@@ -1,6 +1,6 @@
 //! Newtypes for quantities with units, so that arguments of public functions cannot be swapped.
 //!
-//! They have no arithmetic. Internal code uses the bare number (field `0`).
+//! These types have no arithmetic operators. Internal code uses the bare number (field `0`).
 
 use core::fmt;
 

@@ -36,7 +36,7 @@ pub struct DataSet {
 pub struct TrialEntry {
     /// File, relative to the data set's folder.
     pub file: String,
-    /// What was done in the trial.
+    /// Kind of motion in the trial.
     pub kind: TrialKind,
     /// Opening of the valve, 0..1, if one opening was held during the trial.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -52,7 +52,7 @@ pub struct TrialEntry {
     pub digest: Option<String>,
 }
 
-/// What was done in a trial.
+/// Kind of motion in a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum TrialKind {

@@ -19,7 +19,7 @@ const BRIDGED_S: f64 = 0.5;
 pub struct SessionTrial {
     /// The recorded data.
     pub trial: Trial,
-    /// What was done in the trial.
+    /// Kind of motion in the trial.
     pub kind: TrialKind,
     /// Session time of its first sample, s.
     pub start_s: f64,

@@ -57,8 +57,8 @@ impl LowPassSpec {
         self.with_poles::<T>((k - 1.0) / (k + 1.0), 0.0, 2.0 * k / (k + 1.0), 1)
     }
 
-    /// Creates a section from pole coefficients. They are rounded to `T` first, and the numerator
-    /// is computed from the rounded values, so that a constant passes with gain 1.
+    /// Creates a section from pole coefficients. The pole coefficients are rounded to `T` first, and the numerator is
+    /// computed from the rounded values, so that a constant passes with gain 1.
     fn with_poles<T: Real>(
         &self,
         a1: f64,

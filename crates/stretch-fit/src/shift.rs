@@ -33,7 +33,7 @@ const BINOMIALS: [[f64; POWERS]; POWERS] = {
 
 /// Returns the upper triangular matrix `S` with `(columns in v + by) = (columns in v) S`.
 ///
-/// For the coefficients of a surface: those in `v` are `S` times those in `v + by`.
+/// The coefficients of a surface over `v` are `S` times its coefficients over `v + by`.
 pub(crate) fn shift<T: Real, const TERMS: usize>(degree: Degree, by: T) -> [[T; TERMS]; TERMS] {
     let terms = exponents::<TERMS>(degree);
     let mut powers = [T::one(); POWERS];

@@ -34,7 +34,7 @@ impl Track {
         Self { label: stamps.name.clone(), stamps, channels }
     }
 
-    /// Removes samples. Their indices must be in ascending order.
+    /// Removes the samples with these indices, which must be in ascending order.
     pub(crate) fn remove(&mut self, samples: &[usize]) {
         if samples.is_empty() {
             return;

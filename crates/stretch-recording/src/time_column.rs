@@ -78,8 +78,8 @@ impl fmt::Display for TimeColumn {
 }
 
 impl TimeColumn {
-    /// Returns the text for a calibration file. It is empty for the default column, and for a rate, because the
-    /// calibration file contains the sample rate.
+    /// Returns the text for a calibration file. The text is empty for the default column. It is also empty for a rate,
+    /// because the calibration file contains the sample rate.
     pub fn stored(&self) -> String {
         match self {
             Self::Named(name, None) if name == TIME => String::new(),

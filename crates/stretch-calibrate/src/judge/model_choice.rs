@@ -316,7 +316,7 @@ const BUDGET: &str = include_str!("../budget.txt");
 /// Returns the number of instructions per sample on a Cortex-M3, which has no floating-point unit and computes in `f32`
 /// from volts. Returns `None` for a model that was not measured.
 ///
-/// It was measured with the largest model that a fit of this name can choose; an observer was measured with a single
+/// The number was measured with the largest model that a fit of this name can choose; for an observer, with a single
 /// relaxation.
 ///
 /// ```

@@ -23,7 +23,7 @@ pub(super) const PLACE_BITS: u32 = 16;
 pub(super) const SHARE_BITS: u32 = 31;
 /// Bits by which a 16-bit sample is shifted up.
 pub(super) const SIGNAL_BITS: u32 = 12;
-/// Largest magnitudes. Within them, no sum in a step exceeds 32 bits and no product exceeds 63 bits.
+/// Largest magnitudes. If no number exceeds them, no sum in a step exceeds 32 bits and no product exceeds 63 bits.
 const MOST_SIGNAL: i32 = 1 << 28;
 const MOST_TARGET: i32 = 4 << TARGET_BITS;
 const MOST_WEIGHT: i32 = 16 << WEIGHT_BITS;

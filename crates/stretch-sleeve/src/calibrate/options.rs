@@ -15,8 +15,8 @@ pub struct SleeveOptions {
     pub signals: Vec<String>,
     /// Column of the reference; with a prior, empty for the name in the prior.
     pub reference: String,
-    /// Path of the session, from the coarsest to the finest step: the sensor, the wearer, the activity. Empty for an
-    /// unknown one.
+    /// Path of the session, from the coarsest to the finest step: the sensor, the wearer, the activity. Empty if the
+    /// path is unknown.
     pub path: Vec<String>,
     /// Resting length, as [`Options::rest_length`](stretch_calibrate::Options::rest_length); not used with a prior.
     pub rest_length: Option<f64>,
@@ -46,7 +46,7 @@ impl SleeveOptions {
 pub struct SleeveFit<S> {
     /// The calibration.
     pub calibration: SleeveCalibration,
-    /// Its errors, or what was assumed.
+    /// Errors of the calibration, or the assumptions on which it is based.
     pub summary: S,
     /// Notes on the data, and on what the prior knows.
     pub notes: Vec<String>,

@@ -101,7 +101,7 @@ impl<T: Real> TurnFinder<T> {
 /// Innovations are clipped at two standard deviations of levels, and `z` is clipped at the limit, because the
 /// calibration has not seen larger changes.
 ///
-/// This assumes that movements return to the ends that they had before. A movement that does not looks like a shift.
+/// This assumes that movements return to the ends that they had before. A movement with other ends looks like a shift.
 /// Without movements nothing is reported.
 ///
 /// ```

@@ -129,7 +129,7 @@ pub fn evaluate_arrays(
     evaluate_methods(&named, trials, all)
 }
 
-/// Returns the calibration of one of several gauges. It accepts samples of any size.
+/// Returns the calibration of one of several gauges. The calibration that is returned accepts samples of any size.
 fn alone(
     calibration: &ArrayCalibration<MAX_CHANNELS>,
     k: usize,

@@ -389,8 +389,8 @@ pub(crate) fn elsewhere<'a>(signals: &'a [String], others: &[String]) -> Option<
 }
 
 /// Returns whether the reference is in another unit. The pairs contain the correlation of each channel with the
-/// reference, and the change of the reference per change of the channel relative to the usual. Wearers differ by less
-/// than the factor of ten between the two nearest units.
+/// reference, and the change of the reference per change of the channel relative to the usual. The ratio between
+/// wearers is below ten, the smallest ratio between two units.
 pub(crate) fn is_other_unit(channels: impl Iterator<Item = (f64, f64)>) -> bool {
     const USUAL: std::ops::RangeInclusive<f64> = 0.2..=5.0;
     let mut clear = channels.filter(|(correlation, _)| correlation.abs() > CLEAR).peekable();

@@ -1,9 +1,9 @@
 #!/bin/sh
 # Exports the board's calibrations in C (`stretch export`), compiles them with
 # arm-none-eabi-gcc -O2, replays the trial on an emulated Cortex-M3 and Cortex-M4F
-# and prints a line for each, as measure.sh does for Rust:
+# and prints one line for each model, as measure.sh does for Rust:
 #   core=m3 c=poly13-fixed mean=107.7 max=116 stack_bytes=.. state_bytes=.. checksum=..
-# Each runs its self-test first. STRETCH is the program to export with.
+# Each program runs its self-test first. STRETCH is the path of the program stretch.
 set -eu
 cd "$(dirname "$0")"
 
@@ -16,7 +16,7 @@ fi
 STRETCH_C=$(mktemp -d)
 export STRETCH_C
 trap 'rm -rf "$STRETCH_C"' EXIT
-# as golden.txt calls the model, the record of its calibration, the form
+# each line: name of the model in golden.txt, name of its binary calibration file, form
 while read -r model record form; do
     "$STRETCH" export --calibration "data/$record.postcard" --form "$form" --c "$STRETCH_C/$model" >/dev/null
 done <<'MODELS'

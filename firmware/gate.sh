@@ -1,17 +1,17 @@
 #!/bin/sh
-# Fails unless every model gives the host's bits on both emulated cores and stays
-# inside its budget, which `stretch calibrate --model auto` prints: instructions
-# (mean, 2 % either way: a table that says too much is wrong as well), stack (at
-# most), .text (+ 1 %: the order of functions, and a few bytes with it, depends on
-# the folder that the sources lie in). Prints SKIPPED, and succeeds, where there is
-# no emulator.
+# Fails unless every model gives the same bits as the host on both emulated cores and
+# keeps its budget, which `stretch calibrate --model auto` prints. The mean number of
+# instructions may differ by 2 % in either direction, because a table with too large
+# numbers is wrong as well. The stack must not exceed the budget. .text may exceed it
+# by 1 %, because the order of functions, and with it a few bytes, depends on the
+# folder of the sources. Without an emulator, prints SKIPPED and succeeds.
 #
-# The same for what `stretch export` makes of the models in C, where there is an
-# arm-none-eabi-gcc: the bits always, the instructions (c_budget.txt) where it is the
-# compiler that they were counted with.
+# If arm-none-eabi-gcc is installed, the C code from `stretch export` is checked in
+# the same way: always for its bits, and for its instructions (c_budget.txt) if the
+# compiler is the one with which they were counted.
 #
 #   ./gate.sh            compares with golden.txt, budget.txt and c_budget.txt
-#   ./gate.sh --write    writes the budgets anew from what is measured
+#   ./gate.sh --write    writes new budgets from the measured values
 set -eu
 cd "$(dirname "$0")"
 budget=../crates/stretch-calibrate/src/budget.txt

@@ -2,7 +2,7 @@
 # Builds every program of src/bin that replays the trial, runs it on an emulated
 # Cortex-M3 and Cortex-M4F, and prints one line for each:
 #   core=m3 model=poly13-fixed mean=98.0 max=106 text_bytes=.. stack_bytes=.. state_bytes=.. checksum=..
-# mean and max are instructions a sample. Names of models as arguments select some.
+# mean and max are instructions per sample. Arguments are the models to measure.
 set -eu
 cd "$(dirname "$0")"
 
@@ -16,7 +16,7 @@ for core in m3 m4f; do
     esac
     cargo build --locked --quiet --release --target "$triple" --bins
     for model in $models; do
-        # a fault would hang the emulator, on any machine; standard error has remarks for people
+        # the time limit is for a fault, which would hang the emulator; standard error has only remarks
         timeout 600 qemu-system-arm -M "$machine" -cpu "$cpu" -nographic -icount shift=7 \
             -semihosting-config enable=on,target=native \
             -kernel "$target_dir/$triple/release/$model" 2>/dev/null </dev/null |

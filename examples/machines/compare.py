@@ -1,8 +1,7 @@
-"""What one does without a diagnosis: re-tuning alone, and all candidates free at once (as `mujoco.sysid` fits whatever is free).
+"""Two methods without a diagnosis: re-tuning alone, and a fit of all candidates at once (as in `mujoco.sysid`).
 
-Both are least squares over the fitted trials, from the simulator as shipped. Candidates are written here from their textbook
-forms, a few for each signal: delay, lag, backlash, dead zone, saturation, friction. None is chosen: every one has the value
-that lowers the sum most.
+Both are least-squares fits to the fitted trials that start from the simulator as shipped. The candidates are textbook forms, a
+few for each signal: delay, lag, backlash, dead zone, saturation, friction. No candidate is selected; all are fitted together.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ class Span:
 
 @dataclass
 class Free:
-    """A number that is fitted: where it starts, how far it may go, and the size of a step."""
+    """A number that is fitted: its start value, its bounds, and the scale of a step."""
 
     name: str
     start: float
@@ -37,7 +36,7 @@ class Free:
 
 
 class Table(np.ndarray):
-    """Columns by name, as the program's own calls have them."""
+    """An array whose columns can be read by name, as in the calls that the program makes."""
 
     def __getitem__(self, at):
         return np.asarray(self)[:, self.names.index(at)] if isinstance(at, str) else np.asarray(self)[at]
@@ -50,7 +49,7 @@ def table(rows, names):
 
 
 class Problem:
-    """A problem's file with its recordings end to end, and its simulator."""
+    """A problem file, its recordings joined end to end, and its simulator."""
 
     def __init__(self, path: Path) -> None:
         self.file = tomllib.loads(path.read_text())
@@ -63,7 +62,7 @@ class Problem:
         self.is_test = np.zeros(int(ends[-1]), dtype=bool)
         for trial, span in zip(self.file["trial"], self.spans):
             self.is_test[span.samples] = trial.get("split") == "test"
-        if not self.is_test.any():  # the last quarter of each, as the program does
+        if not self.is_test.any():  # the last quarter of each recording is for testing, as in the program
             for span in self.spans:
                 self.is_test[span.samples.start + 3 * (span.samples.stop - span.samples.start) // 4 : span.samples.stop] = True
         module, _, name = self.file["simulator"]["python"].partition(":")
@@ -87,7 +86,7 @@ class Problem:
         return made
 
     def simulate(self, params, effects, inputs):
-        """Outputs of the first stage, `[n, samples]`."""
+        """Returns the outputs of the first stage, `[n, samples]`, for `n` sets of parameters and effects."""
         params = table(params, [p["name"] for p in self.file["parameter"]])
         effects = table(effects, [name for name, _ in self.own])
         method = getattr(self.simulator, "simulate", None)
@@ -141,7 +140,7 @@ KINDS = {"delay": delay, "lag": lag, "backlash": backlash, "dead_zone": dead_zon
 
 
 class Model:
-    """Simulator with parameters, its own effects, and candidates around every input and the output."""
+    """The simulator with its parameters and effects, and with candidates at every input and at the output."""
 
     def __init__(self, problem: Problem, with_candidates: bool) -> None:
         self.problem, self.free = problem, problem.parameters()
@@ -174,7 +173,7 @@ class Model:
         return columns
 
     def outputs(self, values):
-        """Outputs of models, `[n, samples]`."""
+        """Returns the outputs, `[n, samples]`, for `n` rows of values."""
         p, problem = len(self.problem.file["parameter"]), self.problem
         own = values[:, p : p + len(problem.own)] if len(self.free) > p else np.tile(problem.off, (len(values), 1))
         first = p + (len(problem.own) if len(self.free) > p else 0)
@@ -194,7 +193,7 @@ class Model:
         return self._around(out, values, first, problem.stage["output"]) if self.places else out
 
     def fit(self):
-        """Values of least squares on what may be fitted, and how many models were run."""
+        """Returns the least-squares values on the fitted samples, and the number of simulated models."""
         free, problem, runs = self.free, self.problem, 0
         scale = np.array([f.scale for f in free])
         low, high = np.array([f.low for f in free]), np.array([f.high for f in free])
@@ -224,13 +223,13 @@ class Model:
         return done.x * scale, runs
 
     def error(self, values) -> float:
-        """Root of the mean square of what is left on samples that were not fitted."""
+        """Returns the root mean square error on the samples that were not fitted."""
         left = self.outputs(np.asarray(values)[None])[0] - self.problem.columns[self.problem.stage["output"]]
         return float(np.sqrt(np.mean(left[self.problem.is_test] ** 2)))
 
 
 def text(path: Path) -> str:
-    """Both fits of a problem in a few lines."""
+    """Returns a text of a few lines about both fits of a problem."""
     problem, lines, retuned = Problem(path), [], None
     for name, with_candidates in (("re-tuning alone", False), ("all candidates free", True)):
         model = Model(problem, with_candidates)

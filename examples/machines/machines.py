@@ -1,4 +1,4 @@
-"""What the machines have in common: their folders, recordings written as text, and the run of the program."""
+"""Functions for all machines: find their folders, write recordings as text, and run the program."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SYSTEMS = (
 
 
 def module(folder: Path, name: str) -> ModuleType:
-    """A module of a system's folder, under a separate name."""
+    """Imports a module from a system's folder, under a name that is unique to this system."""
     spec = importlib.util.spec_from_file_location(f"{folder.name}_{name}", folder / f"{name}.py")
     assert spec is not None and spec.loader is not None
     made = importlib.util.module_from_spec(spec)
@@ -35,13 +35,13 @@ def module(folder: Path, name: str) -> ModuleType:
 
 
 def write(path: Path, columns: dict[str, np.ndarray]) -> None:
-    """A recording as text, all digits kept."""
+    """Writes a recording as text with all digits."""
     table = np.column_stack([np.asarray(values, dtype=float) for values in columns.values()])
     np.savetxt(path, table, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
 
 
 def prepare(system: str, data: Path, out: Path, every: int = 1, problem: str = "problem.toml", **how) -> Path:
-    """Recordings, problem and simulator of a system in one folder: what `stretch diagnose` takes."""
+    """Writes the recordings, the problem and the simulator of a system into one folder, as input for `stretch diagnose`."""
     folder = HERE / system
     out.mkdir(parents=True, exist_ok=True)
     for name, columns in module(folder, "record").recordings(Path(data), every=every, **how).items():
@@ -53,7 +53,7 @@ def prepare(system: str, data: Path, out: Path, every: int = 1, problem: str = "
 
 
 def diagnose(problem: Path, program: str = "stretch", arguments: tuple[str, ...] = ()) -> dict:
-    """What the program says of a problem, with the seconds that it took."""
+    """Returns the program's diagnosis of a problem, and the seconds that it took."""
     answer, page = problem.parent / "diagnosis.json", problem.parent / "report.html"
     begun = time.monotonic()
     command = [program, "diagnose", str(problem), "--quiet", f"--json={answer}", "--report", str(page), *arguments]

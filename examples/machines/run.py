@@ -1,9 +1,9 @@
-"""A machine that others measured, and the simulator that anyone would write: what is missing?
+"""Diagnoses a simple simulator of a machine that others measured: which effects does the simulator lack?
 
     python run.py SYSTEM DATA [--problem viscous.toml] [--every 2] [--set joint=wpitch] [--out FOLDER] [--compare]
 
-SYSTEM is a folder next to this file, DATA the folder of its recordings (see its DOCUMENTED.md). The program that runs is the
-`stretch` of the search path, or --program.
+SYSTEM is a folder next to this file, DATA the folder of its recordings (see its DOCUMENTED.md). The program is the
+`stretch` on the search path, or the one that --program names.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import machines
 
 
 def row(answer: dict) -> str:
-    """The answer in a few lines."""
+    """Returns a text of a few lines about the answer."""
     candidates = answer["candidates"]
     best = candidates[0]
     probabilities = ", ".join(f"{' + '.join(c['effects']) or 'nothing'} {c['probability']:.2f}" for c in candidates[:4])

@@ -1,8 +1,8 @@
-/* The same servo of first order as servo.py as a worker of stretch, in C99 without a library: the protocol is in book/src/reference/worker.md.
+/* The first-order servo of servo.py as a worker of stretch, in C99 without a library. The protocol: book/src/reference/worker.md.
  *
  *   cc -O2 -ffp-contract=off -o servo servo.c
  *
- * It reads of each header only the numbers that it needs, in the order in which the protocol writes them. */
+ * It reads only the numbers that it needs from each header, in the order in which the program writes them. */
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -10,8 +10,8 @@
 
 enum { MOST_TRIALS = 4096 };
 
-static char *text;   /* header of the last frame, ended by a 0 */
-static double *body; /* its numbers */
+static char *text;   /* header of the last frame, with a 0 at its end */
+static double *body; /* numbers of the last frame */
 static double dt_s, *command;
 static size_t samples_of[MOST_TRIALS], trials;
 
@@ -23,14 +23,14 @@ static void must(int is_good, const char *why)
     }
 }
 
-/* A little-endian machine, as nearly all are: numbers are read as they stand. */
+/* The machine must be little-endian, as nearly all are, because the bytes of numbers are copied unchanged. */
 static void receive(void)
 {
     unsigned char prefix[16];
     uint32_t header;
     uint64_t bytes;
     if (fread(prefix, 1, 16, stdin) != 16)
-        exit(0); /* the other side is gone */
+        exit(0); /* the program has closed the pipe */
     memcpy(&header, prefix + 4, 4);
     memcpy(&bytes, prefix + 8, 8);
     text = realloc(text, (size_t)header + 1);
@@ -54,14 +54,14 @@ static void send(const char *header, const double *numbers, size_t count)
     fflush(stdout);
 }
 
-/* Behind the next `key` from `at` on; 0 where there is none. */
+/* Returns the position after the next `key` from `at` on; 0 if there is none. */
 static const char *behind(const char *at, const char *key)
 {
     at = at ? strstr(at, key) : 0;
     return at ? at + strlen(key) : 0;
 }
 
-/* How many names stand in the list behind a key. */
+/* Returns the number of names in the list after a key. */
 static size_t names(const char *key)
 {
     const char *at = behind(text, key), *end = at ? strchr(at, ']') : 0;
@@ -80,7 +80,7 @@ static void session(void)
     trials = 0;
     for (at = text; (at = behind(at, "\"samples\":")) && trials < MOST_TRIALS; trials++)
         all += samples_of[trials] = strtoul(at, 0, 10);
-    /* The column whose name is that of the first input. */
+    /* Find the column of the first input by its name. */
     const char *input = behind(behind(text, "\"inputs\":["), "\"");
     const char *name = behind(text, "\"columns\":[");
     size_t length = input ? strcspn(input, "\"") : 0;
@@ -95,7 +95,7 @@ static void session(void)
     send("{\"kind\":\"ready\"}", 0, 0);
 }
 
-/* angle' = (gain u - brake - angle)/tau by Euler's steps, each trial from rest. */
+/* angle' = (gain u - brake - angle)/tau by Euler steps; each trial starts at rest. */
 static size_t servo(const double *p, const double *u, size_t count, double *out)
 {
     double gain = p[0], tau = p[1], brake = p[2], step = dt_s / tau;
@@ -123,7 +123,7 @@ static void simulate(void)
     char *header = malloc(room);
     must(header != 0, "no memory");
     strcpy(header, "{\"kind\":\"outputs\",\"models\":[");
-    /* Keys of a model come in the order of the alphabet: inputs, stage, trials. */
+    /* The keys of a model are in alphabetical order: inputs, stage, trials. */
     for (int first = 1; (at = behind(at, "\"inputs\":")); first = 0) {
         int is_altered = *at == 't';
         const char *of = behind(at, "\"trials\":");

@@ -1,4 +1,4 @@
-"""A servo of first order as a worker of stretch: NumPy only. The protocol is in book/src/reference/worker.md."""
+"""A first-order servo as a worker of stretch, which needs only NumPy. The protocol is in book/src/reference/worker.md."""
 import json
 import struct
 import sys
@@ -6,13 +6,13 @@ import sys
 import numpy as np
 
 SOURCE, SINK = sys.stdin.buffer, sys.stdout.buffer
-sys.stdout = sys.stderr  # whatever is printed must not get between the frames
+sys.stdout = sys.stderr  # printed text must not mix with the frames
 
 
 def receive():
     prefix = SOURCE.read(16)
     if len(prefix) < 16:
-        sys.exit(0)  # the other side is gone
+        sys.exit(0)  # the program has closed the pipe
     header, body = struct.unpack("<4xIQ", prefix)
     return json.loads(SOURCE.read(header)), np.frombuffer(SOURCE.read(body), "<f8")
 
@@ -24,7 +24,7 @@ def send(header, body=b""):
 
 
 def servo(gain, tau, brake, u, trials):
-    """angle' = (gain u - brake - angle)/tau by Euler's steps, each trial from rest."""
+    """angle' = (gain u - brake - angle)/tau by Euler steps; each trial starts at rest."""
     step, out, first = DT_S / tau, np.empty_like(u), 0
     for trial in trials:
         angle = 0.0

@@ -1,18 +1,18 @@
-"""Two cascaded tanks as a worker of stretch that lets its levels spill. The protocol is in book/src/reference/worker.md."""
+"""Two cascaded tanks as a worker of stretch whose levels may overflow. The protocol is in book/src/reference/worker.md."""
 import json
 import math
 import struct
 import sys
 
 SOURCE, SINK = sys.stdin.buffer, sys.stdout.buffer
-sys.stdout = sys.stderr  # whatever is printed must not get between the frames
+sys.stdout = sys.stderr  # printed text must not mix with the frames
 LEVELS = ["upper", "lower"]
 
 
 def receive():
     prefix = SOURCE.read(16)
     if len(prefix) < 16:
-        sys.exit(0)  # the other side is gone
+        sys.exit(0)  # the program has closed the pipe
     header, body = struct.unpack("<4xIQ", prefix)
     header, body = json.loads(SOURCE.read(header)), SOURCE.read(body)
     return header, struct.unpack(f"<{len(body) // 8}d", body)
@@ -25,7 +25,7 @@ def send(header, numbers=()):
 
 
 def tanks(parameters, effects, pump, trials):
-    """upper' = inflow pump - drain sqrt(upper), lower' = drain (sqrt(upper) - sqrt(lower)), by Euler's steps."""
+    """upper' = inflow pump - drain sqrt(upper), lower' = drain (sqrt(upper) - sqrt(lower)), by Euler steps."""
     inflow, drain = (parameters[name] for name in ("inflow", "drain"))
 
     def held(name, level):

@@ -1,4 +1,4 @@
-"""Recordings of the tanks: FOLDER holds dataBenchmark.csv, one row in 4 s."""
+"""Recordings of the tanks: FOLDER holds dataBenchmark.csv, with one row every 4 s."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 
 DT_S = 4.0
 FIRST_S = 0.5
-"""Whole seconds that are 4 apart would be taken for milliseconds."""
+"""Time of the first row. It is not a whole second, because whole numbers in steps of 4 would be taken for milliseconds."""
 
 
 def recordings(data: Path, every: int = 1) -> dict[str, dict[str, np.ndarray]]:
-    """The authors' two records: one to be fitted, one to be tested on."""
+    """Returns the authors' two records: one for the fit and one for the test."""
     rows = np.genfromtxt(data / "dataBenchmark.csv", delimiter=",", skip_header=1, usecols=(0, 1, 2, 3))[::every]
     time_s = np.arange(len(rows)) * DT_S * every + FIRST_S
     return {

@@ -1,15 +1,15 @@
-"""Two tanks, one above the other, each with a hole: Torricelli's law.
+"""Two tanks, one above the other, each with a hole; the outflow follows Torricelli's law.
 
     h1' = k4 u - k1 sqrt(h1),  h2' = k2 sqrt(h1) - k3 sqrt(h2),  level = h2
 
-Its owner can switch on what tanks may have besides: either may run over, the pump may have a dead zone, the lower one may catch a
-share of what the upper one spills.
+Further effects can be switched on: either tank may overflow, and the lower tank may catch a share of the overflow of the upper
+one.
 """
 
 import numpy as np
 
 STEPS = 4
-"""Steps of the integration for each sample."""
+"""Number of integration steps per sample."""
 
 
 class Tanks:

@@ -1,4 +1,4 @@
-"""Recordings of the damper: FOLDER is the data set's `data`, with dataset-2 and dataset-3 in it."""
+"""Recordings of the damper: FOLDER is the folder `data` of the data set, which contains dataset-2 and dataset-3."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FLAGGED = (
     "2Hz0lbtension0.5amplitude",
     "0.25Hz0lbtension1amplitude",
 )
-"""Tests whose tension the authors call wrong. Two more of theirs, at 0.1 Hz, are larger than what could be had."""
+"""Tests whose tension the authors flag as wrong. The files of two more such tests, at 0.1 Hz, were too large to be obtained."""
 SOUND = (
     "0.5Hz0lbtension1amplitude",
     "1Hz0lbtension1amplitude",
@@ -26,11 +26,11 @@ SOUND = (
     "0.5Hz0lbtension1.5amplitude",
     "1Hz0lbtension1.5amplitude",
 )
-"""Tests at the same tension that they do not."""
+"""Tests at the same tension that the authors do not flag."""
 
 
 def test(data: Path, name: str, every: int = 1) -> dict[str, np.ndarray]:
-    """A test at 128 Hz, or every so many of these rows."""
+    """Returns a test at 128 Hz; with `every`, only each `every`-th of these rows."""
     rows = np.array(json.loads((data / "dataset-2" / "characterization datasets" / f"{name}.json").read_text())["data"])
     rows = rows[:: 8 * every]
     return {
@@ -44,6 +44,6 @@ def test(data: Path, name: str, every: int = 1) -> dict[str, np.ndarray]:
 
 
 def recordings(data: Path, every: int = 1, tests: str = "30 lb") -> dict[str, dict[str, np.ndarray]]:
-    """Five tests at 30 lb, or the eleven at 0 lb."""
+    """Returns five tests at 30 lb, or the eleven tests at 0 lb."""
     names = (*FITTED, *TESTED) if tests == "30 lb" else (*FLAGGED, *SOUND)
     return {name: test(data, name, every) for name in names}

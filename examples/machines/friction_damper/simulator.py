@@ -1,9 +1,9 @@
-"""A damper from its displacement to its force: viscous, or dry with a little viscous friction; and from the pulls at its band."""
+"""Simulators of the force of a damper: from its displacement, with viscous or dry friction, or from the pulls at its band."""
 
 import numpy as np
 
 WIDTH_MM_PER_S = 5.0
-"""Speed over which dry friction changes sides."""
+"""Speed scale of the transition at which dry friction changes its sign."""
 
 
 class Damper:
@@ -25,7 +25,7 @@ class Damper:
 
 
 class Band:
-    """The band brake from the pulls at its two ends: force = leverage (pull 2 - pull 1)."""
+    """The force of the band brake from the pulls at its two ends: force = leverage (pull 2 - pull 1)."""
 
     def simulate(self, params, effects, inputs):
         return params[:, :1] * (inputs["pull_2_kn"] - inputs["pull_1_kn"])

@@ -2,9 +2,9 @@
 
     python tension.py FOLDER
 
-FOLDER is the data set's `data`. The simulator takes the force of the damper from the pulls at the two ends of its band; its
-one parameter is re-tuned test by test, and a test whose value differs from the middle of all by more than a tenth is told.
-The authors flag five of the eleven tests at 0 lb that could be had.
+FOLDER is the folder `data` of the data set. The simulator computes the force of the damper from the pulls at the two ends of its
+band. Its only parameter is re-tuned for each test. A test whose value differs from the median by more than a tenth is marked
+"told". The authors flag five of the eleven tests at 0 lb whose files could be obtained.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import record
 
 
 def leverage(columns: dict[str, np.ndarray]) -> tuple[float, float]:
-    """The leverage of least squares, and the share of the force that is left."""
+    """Returns the least-squares leverage, and the share of the force's variance that remains."""
     pull, force = columns["pull_2_kn"] - columns["pull_1_kn"], columns["force_kn"]
     fitted = float(pull @ force / (pull @ pull))
     return fitted, float(np.var(force - fitted * pull) / np.var(force))

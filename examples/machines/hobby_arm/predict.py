@@ -1,10 +1,10 @@
-"""What is named on three motions of an arm predicts the others.
+"""Tests whether the effects that are named on three motions of an arm predict the other motions.
 
     python predict.py FOLDER [--joints rot,pitch] [--drop]
 
-FOLDER is the authors' `output/real/so101/custom`: a folder a motion. Three motions are fitted, and the fix that the diagnosis
-gives (parameters and functions) is run on all others. For every motion in which a joint is commanded to move: the error with
-the fix, over that of the simulator whose parameters were re-tuned on the same three motions.
+FOLDER is the authors' `output/real/so101/custom`, with one folder per motion. Three motions are fitted. The simulator with the
+fix of the diagnosis (parameters and functions) is run on all others. The script prints, for the motions in which a joint is
+commanded to move, the error with the fix divided by the error of the simulator that was only re-tuned on the same three motions.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Fixed:
 
 
 def servo(parameters, command: np.ndarray, dt_s: float) -> np.ndarray:
-    """The simulator of the problem, for one command."""
+    """Runs the simulator of the problem for one command."""
     made = simulator.Servo()
     made.begin({"dt_s": dt_s})
     part = SimpleNamespace(samples=slice(0, len(command)))
@@ -55,7 +55,7 @@ def servo(parameters, command: np.ndarray, dt_s: float) -> np.ndarray:
 
 
 def retuned(motions: list[dict[str, np.ndarray]], dt_s: float) -> np.ndarray:
-    """Time constant and offset of least squares on the fitted motions."""
+    """Returns the least-squares time constant and offset for the fitted motions."""
 
     def left(z):
         return np.concatenate([servo(z, m["commanded_rad"], dt_s) - m["measured_rad"] for m in motions])
@@ -80,7 +80,7 @@ def diagnosed(motions: dict[str, dict[str, np.ndarray]], joint: str) -> stretch_
 
 
 def predicted(data: Path, joint: str, every: int = 1) -> tuple[stretch_gap.Diagnosis, dict[str, float], float]:
-    """The diagnosis of a joint, the share of the re-tuned error that is left by motion, and the seconds of the diagnosis."""
+    """Returns the diagnosis of a joint, the error ratio (fix over re-tuning) of each motion, and the seconds of the diagnosis."""
     dt_s = every / record.RATE_HZ
     fitted = {name: record.motion(data, name, joint, every) for name in record.FITTED}
     begun = time.monotonic()

@@ -1,6 +1,6 @@
-"""Recordings of one joint of the arm: FOLDER holds a folder a motion, each with control.csv and state_motor.csv.
+"""Recordings of one joint of the arm: FOLDER holds one folder per motion, each with control.csv and state_motor.csv.
 
-FOLDER may also hold NAME_commanded.csv and NAME_measured.csv, with a column a joint.
+FOLDER may also hold NAME_commanded.csv and NAME_measured.csv, with one column per joint.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ RATE_HZ = 50.0
 
 
 def _authors(folder: Path, joint: int):
-    """Times, s, and positions, rad, of commands and of measurements, as the authors wrote them."""
+    """Returns times, s, and positions, rad, of the commands and of the measurements, from the authors' files."""
     for name in ("control", "state_motor"):
         with open(folder / f"{name}.csv", newline="") as file:
             rows = list(csv.DictReader(file))
@@ -33,7 +33,7 @@ def _columns(data: Path, motion: str, joint: str):
 
 
 def motion(data: Path, name: str, joint: str, every: int = 1) -> dict[str, np.ndarray]:
-    """Commanded and measured position of a joint on one grid; a command holds until the next one."""
+    """Returns the commanded and the measured position of a joint on one time grid; a command holds until the next one."""
     is_authors = (data / name).is_dir()
     read = _authors(data / name, JOINTS.index(joint)) if is_authors else _columns(data, name, joint)
     sent_s, commanded, seen_s, measured = read
@@ -48,5 +48,5 @@ def motion(data: Path, name: str, joint: str, every: int = 1) -> dict[str, np.nd
 
 
 def recordings(data: Path, every: int = 1, joint: str = "elbow") -> dict[str, dict[str, np.ndarray]]:
-    """Three motions of one joint."""
+    """Returns three motions of one joint."""
     return {name: motion(data, name, joint, every) for name in FITTED}

@@ -1,4 +1,4 @@
-"""A position servo: tau dy/dt = command + offset - y, every trial from the command that it begins with."""
+"""A position servo: tau dy/dt = command + offset - y. Every trial starts at rest at its first command."""
 
 import numpy as np
 

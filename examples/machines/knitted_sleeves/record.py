@@ -1,7 +1,7 @@
-"""Recordings of a sleeve: FOLDER is the authors' `data/Regression`, a folder a movement. One minute of the first session of a
-file.
+"""Recordings of a sleeve: FOLDER is the authors' `data/Regression`, with one folder per movement. One minute of the first session
+of a file is read.
 
-FOLDER may also be one session as a file with the columns time_s, angle_deg, s1 to s5.
+In place of FOLDER, a file with one session and the columns time_s, angle_deg, s1 to s5 can be given.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ SECONDS = 60.0
 
 
 def session(data: Path, file: str = "") -> dict[str, np.ndarray]:
-    """Angle and sensors of a session, from the authors' file or one of these columns."""
+    """Returns the angle and the sensor signals of a session, from the authors' file or from a file with the columns above."""
     path = data / file if file else data
     with open(path, encoding="utf-8-sig") as lines:
         has_names = "time_s" in lines.readline()
@@ -26,7 +26,7 @@ def session(data: Path, file: str = "") -> dict[str, np.ndarray]:
 
 
 def recordings(data: Path, every: int = 1, file: str = "", shift_s: float = 0.0) -> dict[str, dict[str, np.ndarray]]:
-    """A session at 50 Hz; with `shift_s` all sensors are read that much later than they were."""
+    """Returns a session at 50 Hz; all sensor signals are delayed by `shift_s`."""
     columns = session(data, file)
     time_s = np.arange(len(columns["angle_deg"])) / RATE_HZ
     for name in SENSORS if shift_s else ():

@@ -1,9 +1,9 @@
-"""Sixteen sessions of knitted sensors, as they are and with all sensors 80 ms late: is that reported?
+"""Diagnoses sixteen sessions of knitted sensors, unchanged and with all signals delayed by 80 ms: is the delay reported?
 
     python shifted.py FOLDER [--program stretch] [--only 4]
 
-FOLDER is the authors' `data/Regression`. Of a session both answers are compared: what is named of time, and by how much later
-it is.
+FOLDER is the authors' `data/Regression`. The script compares both answers for a session: which common time shift is named, and
+how large it is.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ FILES = [
 
 
 def late(answer: dict) -> tuple[list[str], float]:
-    """What is named of the time that all sensors share, and by how many seconds they are late; 0 where nothing is."""
+    """Returns the named effects on the time that all sensors share, and the common delay in seconds (0 if none is named)."""
     values = answer["candidates"][0]["parameter_values"] if answer["candidates"] else []
     shared = [v for v in values if v["effect"] in answer["named"] and v["effect"].startswith("record.")]
     return sorted({v["effect"] for v in shared}), sum(v["value"] for v in shared if v["name"] in ("skew_s", "delay_s"))
@@ -44,7 +44,7 @@ def main() -> None:
                 found.append(machines.diagnose(problem, args.program))
         (names, before), (shifted, after) = map(late, found)
         named += bool(shifted)
-        # What is not named before is not known to be nothing.
+        # Without a named shift in the unchanged session, its size there is unknown and cannot be compared.
         told += bool(shifted and names) and abs(after - before - SHIFT_S) < 0.02
         print(f"{file}: as it is {names} {before:.3f} s; shifted {shifted} {after:.3f} s; {after - before:+.3f} s", flush=True)
     print(f"something of time that all share is named in {named} of {min(args.only, len(FILES))} sessions that are shifted")

@@ -1,4 +1,4 @@
-"""Five stretch sensors on a knee: each a curve of third order over the angle, as calibrations of such sensors are."""
+"""Five stretch sensors on a knee: each signal is a cubic polynomial of the angle, as in calibrations of such sensors."""
 
 SENSORS = ("s1", "s2", "s3", "s4", "s5")
 TURN_DEG = 90.0

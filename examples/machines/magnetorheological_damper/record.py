@@ -1,4 +1,4 @@
-"""The recording of the damper: FOLDER holds boucwen_histeretic_system.csv, without a time; position and velocity fit 2 ms."""
+"""The recording of the damper: FOLDER holds boucwen_histeretic_system.csv, without a time; its position and velocity imply 2 ms."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 
 DT_S = 0.002
 LEFT_OUT = 100
-"""Rows at the beginning at which nothing has moved yet."""
+"""Number of rows at the beginning that are left out, because nothing has moved yet."""
 
 
 def recordings(data: Path, every: int = 1) -> dict[str, dict[str, np.ndarray]]:
-    """Two thirds to be fitted, the rest to be tested on."""
+    """Returns the first two thirds for the fit, and the rest for the test."""
     rows = np.genfromtxt(data / "boucwen_histeretic_system.csv", delimiter=",", names=True)[LEFT_OUT::every]
     cut = 2 * len(rows) // 3
 

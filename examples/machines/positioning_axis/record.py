@@ -8,11 +8,11 @@ import numpy as np
 
 NEWTON_PER_VOLT = 35.15065188248547
 HALF_WINDOW = 5
-"""Half the window of the local cubic that gives speed and acceleration, samples at 1 kHz."""
+"""Half width of the window of the local cubic that gives speed and acceleration, in samples at 1 kHz."""
 
 
 def derivatives(values, dt_s):
-    """Value, first and second derivative from cubics fitted to every sample's neighbourhood (Savitzky and Golay)."""
+    """Returns value, first and second derivative from cubics that are fitted around each sample (Savitzky and Golay)."""
     reach = np.arange(-HALF_WINDOW, HALF_WINDOW + 1)
     taps = np.linalg.pinv(np.vander(reach * dt_s, 4, increasing=True))
     smooth = [np.convolve(values, taps[k][::-1], "valid") for k in range(3)]
@@ -20,13 +20,13 @@ def derivatives(values, dt_s):
 
 
 def recordings(data: Path, every: int = 1) -> dict[str, dict[str, np.ndarray]]:
-    """Columns at 200 Hz, or every so many of these rows."""
+    """Returns the columns at 200 Hz; with `every`, only each `every`-th of these rows."""
     made = {}
     for name in ("emps_identification", "emps_pulses"):
         table = np.genfromtxt(data / f"{name}.csv", delimiter=",", names=True)
         dt_s = float(np.median(np.diff(table["time_s"])))
         position, velocity, acceleration = derivatives(table["position_m"], dt_s)
-        # the force through the same window, so that both lose the same
+        # the force is smoothed by the same window, so that force and motion lose the same frequencies
         force = derivatives(NEWTON_PER_VOLT * table["drive_v"], dt_s)[0]
         columns = {
             "time_s": np.arange(len(position)) * dt_s,

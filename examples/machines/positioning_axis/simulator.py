@@ -1,4 +1,4 @@
-"""A carriage on a rail: a mass with viscous friction, from its motion to the force and from the force to its velocity."""
+"""A carriage on a rail, as a mass with viscous friction: the force from the motion, and the velocity from the force."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ class Inverse:
 
 
 class Forward:
-    """mass dv/dt = force - viscous v, every trial from rest, the force held from sample to sample."""
+    """mass dv/dt = force - viscous v. Every trial starts at rest, and the force is constant from sample to sample."""
 
     def begin(self, session):
         self.dt_s = session["dt_s"]

@@ -1,6 +1,7 @@
 """Recordings of one servo on the test stand: FOLDER holds motor_telemetry_NAME.csv.
 
-The servo holds a command while two others pull at its lever by rubber bands, one to each side. Steps of 2 pi/4096.
+The servo holds a command while two other servos pull at its lever through rubber bands, one to each side. Angles have steps of
+2 pi/4096.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 DEGREES_PER_STEP = 360.0 / 4096.0
 STANDS = {
-    # name: log, servo under test, the two that pull and their commands at rest
+    # name: log, servo under test, the two pulling servos with their commands at rest
     "single": ("single", 5, {3: 1747, 4: 2347}),
     "preloaded": ("comp2", 1, {3: 1747, 4: 2347}),
     "not_preloaded": ("nocomp2", 1, {3: 1747, 4: 2347}),
@@ -21,7 +22,7 @@ STANDS = {
 
 
 def read(data: Path, stand: str) -> dict[str, np.ndarray]:
-    """Time, command, position and pull of the rows in which all are known."""
+    """Returns time, command, position and pull of the rows in which all positions are known."""
     log, own, pullers = STANDS[stand]
     with open(data / f"motor_telemetry_{log}.csv", newline="") as file:
         rows = [row for row in csv.DictReader(file) if all(row[f"pos ({m})"] for m in (own, *pullers))]
@@ -30,7 +31,7 @@ def read(data: Path, stand: str) -> dict[str, np.ndarray]:
     def column(name):
         return np.array([float(row[name]) for row in rows])
 
-    # each puller stretches its band by what it has turned away from rest, and the two pull against each other
+    # each pulling servo stretches its band by its angle from rest, and the two pull in opposite directions
     pull = -sum(column(f"pos ({motor})") - rest for motor, rest in pullers.items())
     return {
         "time_s": np.array(stamps) - stamps[0],
@@ -41,12 +42,12 @@ def read(data: Path, stand: str) -> dict[str, np.ndarray]:
 
 
 SETTLED_S = 0.8
-"""How long after a command the servo has arrived."""
+"""Time after a command at which the servo has reached its position."""
 
 
 def recordings(data: Path, every: int = 1, stand: str = "single") -> dict[str, dict[str, np.ndarray]]:
-    """The holds of a log at its 10 Hz, end to end: what is between two commands is left out, since how it moves is
-    another question."""
+    """Returns the holds of a log at 10 Hz, joined end to end. The motions from one command to the next are left out, because the
+    simulator models holds only."""
     rows = read(data, stand)
     time_s = np.arange(0.0, rows["time_s"][-1], 0.1 * every)
     last = np.maximum(np.searchsorted(rows["time_s"], time_s + 1e-9, side="right") - 1, 0)

@@ -1,4 +1,4 @@
-"""A servo on its holds, with a stiff spring at its output: angle = offset + compliance times pull."""
+"""A servo that holds its position, with a stiff spring at its output: angle = offset + compliance times pull."""
 
 
 def servo(params, effects, inputs):

@@ -1,22 +1,22 @@
 """A mass on a spring: y'' + 2 damping w y' + w^2 y = gain w^2 u, w = 2 pi frequency.
 
-Its owner can switch on what a spring and a damper may have besides: a quadratic and a cubic spring, dry friction, quadratic
-damping. The linear part is exact for an input on straight lines; the rest kicks the speed between its steps (Strang's
+Further effects can be switched on: a quadratic and a cubic spring, dry friction, quadratic damping. The linear part is integrated
+exactly for an input that is linear between samples; the other forces change the speed before and after each step (Strang
 splitting).
 """
 
 import numpy as np
 
 STEPS = 2
-"""Steps of the integration for each sample."""
+"""Number of integration steps per sample."""
 
 
 def exact(w, damping, h):
-    """Matrices of one step of the linear part: state after h from the state, and from the input at both ends."""
+    """Returns the matrices of one step h of the linear part, for the state and for the input at both ends of the step."""
     real, turn = damping * w, w * np.sqrt(np.maximum(1.0 - damping**2, 1e-12))
     c, s = np.exp(-real * h) * np.cos(turn * h), np.exp(-real * h) * np.sin(turn * h) / turn
     state = np.array([[c + real * s, s], [-(w**2) * s, c - real * s]])
-    # a constant input of 1 rests at y = 1; a ramp of 1/h follows 2 damping/w late
+    # the response to a constant input of 1 is y = 1; the response to a ramp of slope 1/h is delayed by 2 damping/w
     held = np.array([1.0 - state[0, 0], -state[1, 0]])
     late = 2.0 * damping / w
     ramp = np.array([(h - late * held[0] - state[0, 1]) / h, (1.0 - late * held[1] - state[1, 1]) / h])

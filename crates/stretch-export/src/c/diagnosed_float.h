@@ -428,7 +428,7 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
     const float probe = far ? run : run < 0.0f ? -STRETCH_LEAST_RUN : STRETCH_LEAST_RUN;
     const float asked = (stretch_drive(s, here + probe) - drive) / probe;
     const float answer = asked > STRETCH_LEAST_ANSWER ? asked : STRETCH_LEAST_ANSWER;
-    /* the same for the curve, so that a flat end of it cannot move the estimate too far */
+    /* the slope of the curve: the steeper of secant and tangent, so that a flat end cannot move the estimate too far */
     const float secant = far ? surprise / run : tangent;
     const float slope = answer * (secant > tangent ? secant : tangent);
     const float by_y = slope * s->yy, by_r = slope * s->yr;
@@ -442,7 +442,7 @@ STRETCH_INLINE int stretch_correct(stretch_state *s, float signal)
     stretch_hold(s);
 @if slip
     {
-        /* the signal of a gauge without memory */
+        /* the signal that a gauge without memory would have */
         const float shown = stretch_forward(here, &tangent) + surprise;
         s->shown = s->shown + STRETCH_SMOOTH * (shown - s->shown);
         stretch_turn(s);

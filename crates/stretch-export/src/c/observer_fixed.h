@@ -153,7 +153,7 @@ STRETCH_INLINE void stretch_hold(stretch_state *s)
     }
 }
 
-/* Product of a gain and a surprise, rounded. */
+/* Product of a gain and a surprise (signal minus predicted signal), rounded. */
 STRETCH_INLINE int32_t stretch_pull(int32_t gain, int32_t surprise)
 {
     return stretch_saturate((stretch_product(gain, surprise) + STRETCH_GAIN_HALF) >>

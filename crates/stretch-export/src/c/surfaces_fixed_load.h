@@ -178,7 +178,7 @@ static STRETCH_APART uint8_t stretch_load(const uint8_t *record, size_t size)
         /* it has no checksum */
         return STRETCH_OTHER_VERSION;
     }
-    /* the checksum of bytes with their own checksum behind them */
+    /* bytes that are followed by their own checksum always have this checksum */
     if (stretch_checksum(record, size) != 0x48674bc7u) {
         return STRETCH_DAMAGED;
     }

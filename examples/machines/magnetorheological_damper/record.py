@@ -1,4 +1,4 @@
-"""The recording of the damper: FOLDER holds boucwen_histeretic_system.csv, without a time; its position and velocity imply 2 ms."""
+"""The recording of the damper: FOLDER holds boucwen_histeretic_system.csv, without a time; position and velocity imply 2 ms."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-/* Answers every row of standard input: one sample a gauge (32 bits in hexadecimal), or r and the number
- * of a gauge that is taken back. */
+/* Prints the reading for every row of standard input: one sample per gauge (32 bits in hexadecimal), or r and the number
+ * of a gauge that is used again. */
 #include "stretch.h"
 
 #include <stdio.h>

@@ -1,6 +1,6 @@
-/* Answers every sample of standard input (32 bits in hexadecimal, x for one that did not come); where
- * the header takes a pressure, that comes before each. Where it can load a calibration: load, the bytes of a record and
- * a dot, which is answered by the result. */
+/* Prints the reading for every sample from standard input (32 bits in hexadecimal; x is a missing sample). If the header
+ * takes a pressure, the pressure comes before each sample. If the header can load a calibration, the input may also be
+ * "load", the bytes of a binary calibration file and a dot; the result of loading is then printed. */
 #include "stretch.h"
 
 #include <stdio.h>

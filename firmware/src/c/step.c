@@ -1,4 +1,4 @@
-/* The functions of a header under names of their own, so that several fit into a program. */
+/* The functions of a header, renamed by model, so that a program can contain several headers. */
 #include "stretch.h"
 
 #define JOINED(model, name) c_##model##_##name
@@ -13,7 +13,7 @@ void NAMED(MODEL, init)(stretch_state *state)
     stretch_init(state);
 }
 
-/* The function itself, not one around it: what is counted is its cost. */
+/* A pointer to the function itself and not a wrapper, because its instructions are counted. */
 typedef stretch_reading (*step_type)(stretch_state *state, SAMPLE sample);
 extern const step_type NAMED(MODEL, step);
 const step_type NAMED(MODEL, step) = stretch_step;

@@ -39,7 +39,7 @@ __attribute__((constructor)) static void connect(void)
     stdout = &to_port;
 }
 
-/* The simulator ends where a processor sleeps that no interrupt can wake. */
+/* The simulator ends when the processor sleeps and no interrupt can wake it. */
 __attribute__((destructor)) static void end(void)
 {
     cli();

@@ -1,6 +1,5 @@
-/* The smallest program around a header on an ATmega328P: what the header takes of flash and RAM. With -DSTACK it sends
- * the bytes of stack that its self-test takes,
- * in hexadecimal. */
+/* The smallest program that uses a header on an ATmega328P. Its size shows how much flash and RAM the header needs. With
+ * -DSTACK it sends the number of bytes of stack that the self-test needs, in hexadecimal. */
 #include "stretch.h"
 
 #include <avr/interrupt.h>
@@ -64,7 +63,7 @@ int main(void)
 #else
         reading = stretch_step(&state, (int32_t)ADC);
 #endif
-        /* as if it were read */
+        /* keeps the compiler from removing the unused reading */
         __asm__ volatile("" : : "r"(&reading) : "memory");
     }
 }

@@ -1,4 +1,4 @@
-//! One case: a rig drawn, effects set to the strength wanted, the session recorded.
+//! Makes one case: draws a rig, sets its effects to the requested strengths, and records a session.
 
 use std::collections::BTreeMap;
 
@@ -13,19 +13,21 @@ use crate::rig::{L_STEP, LEAST_STRAIN, Rig, UNCERTAIN, V_FS, V_STEP};
 use crate::session::{Conditions, FINE, Trace, run};
 use crate::truth::{Acting, CaseKind, Label};
 
-/// Rigs drawn before a case is given up.
+/// Largest number of rigs that are drawn for a case before [`BlindError::NoRig`] is returned.
 const TRIES: usize = 60;
 
-/// Measured samples of one trial: pressure in kPa where recorded, length in mm, voltage in V.
+/// Measured samples of one trial: pressure in kPa (`None` if it was not recorded), length in mm,
+/// voltage in V.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Recording {
     pub(crate) script: Script,
     pub(crate) pressure_kpa: Option<Vec<f64>>,
     pub(crate) length_mm: Vec<f64>,
     pub(crate) bridge_v: Vec<f64>,
-    /// Time of each sample, if `time_s` states it and it is not on the grid, s.
+    /// Time of each sample, s; `None` if the samples are on the grid or if `time_s` does not show
+    /// that they are not.
     pub(crate) stamps: Option<Vec<f64>>,
-    /// Samples that are missing; empty when none is.
+    /// Whether each sample is missing; empty if no sample is.
     pub(crate) missing: Vec<bool>,
 }
 
@@ -87,7 +89,7 @@ impl Case {
     }
 }
 
-/// Effects of a recorder on a trial: noise, converters, lost rows.
+/// Adds the effects of a recorder to a trial: noise, converters and lost rows.
 fn record(
     script: &Script,
     trace: Trace,
@@ -149,7 +151,7 @@ fn label(order: Order, rig: &Rig, chosen: &[(Cause, f64)], excess: f64) -> Label
     }
 }
 
-/// The causes of a case with the excess of each alone.
+/// Draws the causes of a case. Returns each with the excess that it causes alone.
 fn choose(
     order: Order,
     plan: &Plan,
@@ -165,7 +167,7 @@ fn choose(
             vec![tuned(Cause::draw(lead, family, random), least, most, yardstick, random)]
         }
         CaseKind::Compound => {
-            // Each is visible alone, and neither hides the other.
+            // Each effect is visible alone, and neither hides the other.
             let first =
                 tuned(Cause::draw(lead, family, random), 1.0, most.max(1.0), yardstick, random);
             let range = ((0.2 * first.1).max(0.5), 5.0 * first.1.max(1.0));
@@ -188,7 +190,7 @@ fn choose(
     }
 }
 
-/// A further cause of another kind whose excess lies in `range`, to a factor of 1.5.
+/// Draws a further cause of another kind. Its excess lies in `range`, within a factor of 1.5.
 fn companion(
     taken: &[Kind],
     family: Family,
@@ -208,15 +210,15 @@ fn companion(
     last.unwrap_or_else(|| (Cause::draw(partner(taken, random), family, random), 0.0))
 }
 
-/// A kind of the catalogue that is not among those taken.
+/// Draws a kind of the catalogue that is not in `taken`.
 fn partner(taken: &[Kind], random: &mut RandomGenerator) -> Kind {
     let free: Vec<Kind> =
         Kind::catalogued().iter().copied().filter(|kind| !taken.contains(kind)).collect();
     random.pick(&free)
 }
 
-/// Sets the strength of a cause so that its excess is log-uniform between `low` and `high`, as
-/// far as its range reaches.
+/// Sets the strength of a cause such that its excess is log-uniform between `low` and `high`. If
+/// the largest strength causes less, this strength is used.
 fn tuned(
     cause: Cause,
     low: f64,
@@ -231,7 +233,8 @@ fn tuned(
     if full <= target {
         return (cause, full);
     }
-    // Bisection of the logarithm, guided by excess ~ strength^2 while that makes progress.
+    // Bisects the logarithm of the strength. Two of three steps assume that the excess is
+    // proportional to strength^2.
     let (mut weak, mut strong) = (spec.least.ln(), cause.most().ln());
     let mut guess = strong - 0.5 * (full / target).ln();
     let mut best = (cause, full);
@@ -258,7 +261,8 @@ fn tuned(
         if faintest >= target {
             return (cause.at(spec.least), faintest);
         }
-        // The excess jumps over the target (a threshold): any strength beyond the jump will do.
+        // The excess jumps over the target, because the effect has a threshold. Any strength beyond
+        // the jump is accepted.
         let strength = random.log_between(strong.exp(), cause.most());
         return (cause.at(strength), measure(strength));
     }
@@ -280,14 +284,14 @@ mod tests {
         let mut yardstick = Yardstick::new(&rig, &scripts, &conditions, &around, true);
         let kinds = Kind::catalogued().iter().filter(|&&k| k != Kind::ValveDeadband);
         for (i, &kind) in kinds.enumerate() {
-            // Every family has its turn.
+            // The kinds use the families in turn.
             let family = Family::ALL[i % Family::ALL.len()];
             for (low, high) in [(0.05, 0.06), (5.0, 6.0)] {
                 let cause = Cause::draw(kind, family, &mut random);
                 let (tuned, excess) = tuned(cause, low, high, &mut yardstick, &mut random);
                 assert!(tuned.strength <= tuned.most());
                 let name = kind.spec().name;
-                // A factor of two, or the end of the range.
+                // The excess is within a factor of two, or the strength is at the end of its range.
                 let reached = excess > 0.5 * low && excess < 2.0 * high;
                 let ended = tuned.strength == tuned.most() && excess < high;
                 assert!(reached || ended, "{name}: {excess} for {low} .. {high}");

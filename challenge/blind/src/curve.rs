@@ -1,8 +1,9 @@
-//! A function of one variable as a table, and how smooth random ones are drawn.
+//! Functions of one variable as tables, and smooth random functions.
 
 use crate::random::RandomGenerator;
 
-/// Intervals of a table: the curve between its knots is the truth itself, not an approximation.
+/// Number of intervals of a table. Between the knots, the true curve is defined as linear, so
+/// interpolation adds no error.
 const INTERVALS: usize = 240;
 
 /// A function on 0..1, linear between knots; beyond the ends it continues with the last slope.
@@ -10,12 +11,13 @@ const INTERVALS: usize = 240;
 pub(crate) struct Curve(Vec<f64>);
 
 impl Curve {
-    /// Tables a function on 0..1.
+    /// Makes the table of a function on 0..1.
     pub(crate) fn table(f: impl Fn(f64) -> f64) -> Self {
         Self((0..=INTERVALS).map(|i| f(i as f64 / INTERVALS as f64)).collect())
     }
 
-    /// Integral of a positive function from 0, over its integral to 1: it rises from 0 to 1.
+    /// Returns the integral of a positive function from 0 to x, divided by the integral from 0
+    /// to 1. It rises from 0 to 1.
     pub(crate) fn risen(slope: impl Fn(f64) -> f64) -> Self {
         let mut sum = 0.0;
         let middle = |i: usize| slope((i as f64 + 0.5) / INTERVALS as f64).max(1e-9);
@@ -27,13 +29,13 @@ impl Curve {
         Self(values.into_iter().map(|v| v / sum).collect())
     }
 
-    /// The same curve times a number.
+    /// Returns the curve multiplied by a number.
     pub(crate) fn times(mut self, factor: f64) -> Self {
         self.0.iter_mut().for_each(|v| *v *= factor);
         self
     }
 
-    /// Largest size of a value.
+    /// Returns the largest absolute value.
     pub(crate) fn size(&self) -> f64 {
         self.0.iter().fold(0.0, |most, v| v.abs().max(most))
     }
@@ -56,7 +58,7 @@ impl Curve {
 
     fn cell(&self, x: f64) -> (f64, f64, f64) {
         let at = x * INTERVALS as f64;
-        // A negative or missing number becomes the first cell.
+        // The cast turns a negative number or NaN into 0, the first cell.
         let low = (at as usize).min(INTERVALS - 1);
         let (a, b) = (self.0[low], self.0[low + 1]);
         (a, b, at - low as f64)
@@ -75,12 +77,12 @@ impl Curve {
     }
 }
 
-/// A smooth random function on 0..1: Catmull's and Rom's spline through Gaussian knots.
+/// A smooth random function on 0..1: a Catmull-Rom spline through knots with Gaussian values.
 #[derive(Debug, Clone)]
 pub(crate) struct Wiggle(Vec<f64>);
 
 impl Wiggle {
-    /// `knots` (at least 2) values of standard deviation `sd`.
+    /// Draws the values at `knots` knots (at least 2) with the standard deviation `sd`.
     pub(crate) fn draw(knots: usize, sd: f64, random: &mut RandomGenerator) -> Self {
         Self((0..knots.max(2)).map(|_| sd * random.gauss()).collect())
     }
@@ -95,12 +97,12 @@ impl Wiggle {
     }
 }
 
-/// Catmull's and Rom's cubic between the middle two of four equidistant values.
+/// Returns the Catmull-Rom cubic between the middle two of four equidistant values.
 pub(crate) fn hermite([a, b, c, d]: [f64; 4], t: f64) -> f64 {
     b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
 }
 
-/// Positive random weights that sum to 1; `sd` is that of their logarithms.
+/// Draws positive weights that sum to 1. `sd` is the standard deviation of their logarithms.
 pub(crate) fn weights(count: usize, sd: f64, random: &mut RandomGenerator) -> Vec<f64> {
     let raw: Vec<f64> = (0..count).map(|_| (sd * random.gauss()).exp()).collect();
     let sum: f64 = raw.iter().sum();

@@ -1,4 +1,5 @@
-//! Disturbances: everything that is neither the rig nor an effect, drawn for each rig.
+//! Disturbances, drawn for each rig: noise, drift of the supply, start pressures, pauses, jitter of
+//! the sampling times and missing rows.
 
 use std::collections::BTreeMap;
 
@@ -10,12 +11,12 @@ use crate::rig::{SIGMA_L, SIGMA_P, SIGMA_V};
 pub(crate) struct Noise {
     /// Standard deviation without outliers.
     pub(crate) sigma: f64,
-    /// Share of the variance that is correlated, and over how many samples.
+    /// Share of the variance that is correlated, and the correlation time in samples.
     slow: f64,
     memory: f64,
     /// Degrees of freedom of Student's t; 0 for a Gaussian.
     freedom: usize,
-    /// Outliers a sample, and their size in sigma.
+    /// Probability that a sample is an outlier, and the size of outliers in multiples of `sigma`.
     outliers: f64,
     outlier_size: f64,
 }
@@ -41,7 +42,7 @@ impl Noise {
         noise
     }
 
-    /// Noise of so many samples.
+    /// Draws the noise of `count` samples.
     pub(crate) fn samples(&self, count: usize, random: &mut RandomGenerator) -> Vec<f64> {
         let mut slow = if self.slow > 0.0 { random.gauss() } else { 0.0 };
         let keep = (-1.0 / self.memory).exp();
@@ -51,7 +52,7 @@ impl Noise {
                 if self.freedom > 0 {
                     let n = self.freedom as f64;
                     let square: f64 = (0..self.freedom).map(|_| random.gauss().powi(2)).sum();
-                    // Variance n / (n - 2) without the last factor.
+                    // Without the last factor the variance would be n / (n - 2).
                     unit *= (n / square).sqrt() * ((n - 2.0) / n).sqrt();
                 }
                 if self.slow > 0.0 {
@@ -73,19 +74,20 @@ pub(crate) struct SupplyWander {
     /// Standard deviation as a share of the supply.
     sd: f64,
     memory_s: f64,
-    /// Lags in a row: 1 is an Ornstein-Uhlenbeck process, 2 and 3 are smoother.
+    /// Number of first-order lags in series: 1 gives an Ornstein-Uhlenbeck process, 2 and 3 give
+    /// smoother processes.
     order: usize,
 }
 
 impl SupplyWander {
-    /// Relative deviations of the supply, at knots `step_s` apart.
+    /// Draws relative deviations of the supply at knots that are `step_s` apart.
     pub(crate) fn knots(
         &self,
         count: usize,
         step_s: f64,
         random: &mut RandomGenerator,
     ) -> Vec<f64> {
-        // Lags in a row share the memory.
+        // The lags in series have `memory_s` as the sum of their time constants.
         let keep = (-step_s * self.order as f64 / self.memory_s).exp();
         let through = |at: &mut [f64], mut x: f64| {
             for z in at.iter_mut() {
@@ -109,39 +111,42 @@ impl SupplyWander {
 /// Deviations of the pressures from which trials start.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StartErrors {
-    /// Mean and standard deviation below the supply, as a share of it.
+    /// Mean and standard deviation of the difference between supply and start pressure, as a share
+    /// of the supply.
     full: (f64, f64),
-    /// Mean above the atmosphere, Pa.
+    /// Mean start pressure of a vented chamber above the atmosphere, Pa.
     empty_pa: f64,
 }
 
 impl StartErrors {
-    /// Share of the supply that a full start lacks (negative: has too much).
+    /// Draws the difference between the supply and the start pressure of a filled chamber, as a
+    /// share of the supply. It is negative if the chamber starts above the supply.
     pub(crate) fn full(&self, random: &mut RandomGenerator) -> f64 {
         self.full.0 + self.full.1 * random.gauss()
     }
 
-    /// Pa above the atmosphere of an empty start.
+    /// Draws the start pressure of a vented chamber above the atmosphere, Pa.
     pub(crate) fn empty(&self, random: &mut RandomGenerator) -> f64 {
         -self.empty_pa * (1.0 - random.unit()).ln()
     }
 }
 
-/// Everything around a rig, of one case.
+/// All disturbances of one case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Surroundings {
-    /// Of pressure in Pa, length in mm, voltage in V.
+    /// Noise of pressure in Pa, length in mm and voltage in V.
     pub(crate) noise: [Noise; 3],
-    /// Whether a rig file says how much noise there is.
+    /// Whether a rig file states the noise.
     pub(crate) stated: bool,
     pub(crate) supply: SupplyWander,
     pub(crate) starts: StartErrors,
     /// Mean and spread of the pauses between trials, s.
     pause_s: (f64, f64),
-    /// How far samples are off the grid (1 sd), s, and whether `time_s` says so.
+    /// Standard deviation of the time between a sample and its place on the grid, s, and whether
+    /// `time_s` holds the true times.
     jitter_s: f64,
     pub(crate) stamped: bool,
-    /// Share of the rows that are missing, and how many in a row.
+    /// Share of the rows that are missing, and the mean number of missing rows in a row.
     dropped: f64,
     in_a_row: f64,
 }
@@ -175,7 +180,7 @@ impl Surroundings {
         }
     }
 
-    /// What the label says of it.
+    /// Returns the disturbances as the label lists them.
     pub(crate) fn facts(&self) -> BTreeMap<String, f64> {
         let mut facts: BTreeMap<String, f64> = [
             ("noise_stated", f64::from(u8::from(self.stated))),
@@ -208,7 +213,7 @@ impl Surroundings {
         facts
     }
 
-    /// One pause, s.
+    /// Draws the duration of a pause, s.
     pub(crate) fn pause(&self, random: &mut RandomGenerator) -> f64 {
         let (mean, spread) = self.pause_s;
         ((mean + spread * random.gauss()).clamp(8.0, 25.0) * 100.0).round() / 100.0
@@ -219,12 +224,12 @@ impl Surroundings {
         if self.jitter_s == 0.0 {
             return Vec::new();
         }
-        // The order of samples is kept: they are 10 ms apart.
+        // The limit of 2 ms keeps the samples in order, because they are 10 ms apart.
         let late = |i| if i == 0 { 0.0 } else { self.jitter_s * random.gauss() };
         (0..count).map(late).map(|late: f64| late.clamp(-2e-3, 2e-3)).collect()
     }
 
-    /// Which samples are missing; empty if none is. The first one is always present.
+    /// Draws which samples are missing; empty if no sample is. The first sample is always present.
     pub(crate) fn missing(&self, count: usize, random: &mut RandomGenerator) -> Vec<bool> {
         if self.dropped == 0.0 {
             return Vec::new();
@@ -233,7 +238,7 @@ impl Surroundings {
         (0..count)
             .map(|i| {
                 if left < 0.5 && random.unit() < self.dropped / self.in_a_row {
-                    // A geometric length of this mean.
+                    // The length of a gap has a geometric distribution with the mean `in_a_row`.
                     let more = 1.0 - 1.0 / self.in_a_row;
                     left = if more > 0.0 {
                         1.0 + ((1.0 - random.unit()).ln() / more.ln()).floor()
@@ -284,7 +289,8 @@ mod tests {
                 let lag = (memory_s / 0.1) as usize;
                 let products = x.iter().zip(&x[lag..]).map(|(a, b)| a * b);
                 let left = products.sum::<f64>() / x.len() as f64 / 0.003_f64.powi(2);
-                // exp(-1) for one lag, (1 + n) exp(-n) and the like for several.
+                // The autocorrelation at `memory_s` is exp(-1) for one lag, and (1 + n) exp(-n) or
+                // similar for several lags.
                 assert!((0.2..0.75).contains(&left), "{order} {memory_s} {left}");
             }
         }

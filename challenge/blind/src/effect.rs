@@ -1,10 +1,11 @@
-//! Causes that may be wrong with a rig: the vocabulary, the forms of each cause here, and the families of forms.
+//! Causes of a gap that a rig may have: their names, the hand-written forms of each, and the families of forms.
 
 use std::fmt;
 
 use crate::random::RandomGenerator;
 
-/// An enumeration with one word per member, used to serialise, to print and to parse it.
+/// Defines an enumeration in which each member has one word, by which it is serialised, printed and
+/// parsed.
 macro_rules! worded {
     ($(#[$own:meta])* $name:ident { $($(#[$doc:meta])* $member:ident $word:literal),* $(,)? }) => {
         $(#[$own])*
@@ -13,10 +14,10 @@ macro_rules! worded {
         pub enum $name { $($(#[$doc])* #[serde(rename = $word)] $member),* }
 
         impl $name {
-            /// All of them, in the order of reports.
+            /// All members, in the order of reports.
             pub const ALL: [Self; [$($word),*].len()] = [$(Self::$member),*];
 
-            /// Name as labels, reports and options write it.
+            /// Name in labels, reports and options.
             #[must_use]
             pub fn name(self) -> &'static str {
                 match self { $(Self::$member => $word),* }
@@ -38,8 +39,8 @@ pub(crate) use worded;
 worded! {
     /// Source of the functional form of every effect of a case.
     ///
-    /// The drawn families differ in kind, not only in numbers, so a threshold that was set on some
-    /// of them can be judged on one left out.
+    /// The drawn families are different types of functions, not only different numbers. A threshold
+    /// that was calibrated on some families can therefore be tested on a family that was left out.
     ///
     /// ```
     /// use stretch_blind::Family;
@@ -48,18 +49,20 @@ worded! {
     /// ```
     #[derive(Default)]
     Family {
-        /// One of a few forms an effect, written by hand.
+        /// A few forms of each effect, written by hand.
         #[default]
         Written "written",
-        /// Smooth random functions: the logarithm of a slope or of a density is a random spline.
+        /// Smooth random functions: the logarithm of the slope or of the density is a random
+        /// spline.
         Splines "splines",
-        /// Many elements at once: several time constants, radii, thresholds, delays, harmonics, with
-        /// random weights or a power law.
+        /// Sums of several elements (time constants, radii, thresholds, delays, harmonics) with
+        /// weights that are random or follow a power law.
         Spectra "spectra",
-        /// Closed-form laws and differential equations with drawn exponents: rates that depend on the
-        /// state, friction by Dahl, Bouc and Wen, or with a Stribeck speed.
+        /// Formulas and differential equations with random exponents: rates that depend on the state,
+        /// and friction of Dahl, of Bouc and Wen, or with a Stribeck velocity.
         RateLaws "rate_laws",
-        /// What differs by direction, side or half: up and down, opening and closing, kinks.
+        /// Forms that differ between directions, sides or halves of the range: up and down, opening
+        /// and closing, kinks.
         Asymmetric "asymmetric",
     }
 }
@@ -71,7 +74,7 @@ impl fmt::Display for Family {
 }
 
 worded! {
-    /// Part of the rig that a cause acts in.
+    /// Part of the rig in which a cause acts.
     Stage {
         /// Openings to pressure.
         Pneumatics "pneumatics",
@@ -93,7 +96,8 @@ pub(crate) struct Spec {
     pub(crate) forms: &'static [&'static str],
     pub(crate) least: f64,
     pub(crate) most: f64,
-    /// Share of `most` that is reached with a negative sign; 0 if the sign is fixed.
+    /// Largest strength with a negative sign, as a share of `most`; 0 if the sign is always
+    /// positive.
     pub(crate) negative: f64,
 }
 
@@ -102,12 +106,12 @@ macro_rules! causes {
         /// Every cause that can be simulated; the first 23 are in the catalogue of effects.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub(crate) enum Kind { $($id),* }
-        /// In the order of [`Kind`].
+        /// Properties of the causes, in the order of [`Kind`].
         pub(crate) static SPECS: &[Spec] = &[$(Spec {
             name: $name, stage: Stage::$stage, forms: &[$($form),+],
             least: $least, most: $most, negative: $negative,
         }),*];
-        /// All kinds, in order.
+        /// All kinds, in the order of [`Kind`].
         pub(crate) static KINDS: &[Kind] = &[$(Kind::$id),*];
     };
 }
@@ -152,7 +156,7 @@ causes! {
     PotStiction "pot_stiction" Reference ["stick_and_jump"] 1e-3 .. 3.0, 0.0;
 }
 
-/// Number of kinds of the list above in the catalogue of effects.
+/// Number of kinds in the list above that are in the catalogue of effects.
 pub(crate) const CATALOGUED: usize = 23;
 
 impl Kind {
@@ -160,22 +164,22 @@ impl Kind {
         &SPECS[self as usize]
     }
 
-    /// The catalogue's kinds.
+    /// Returns the kinds that the catalogue contains.
     pub(crate) fn catalogued() -> &'static [Kind] {
         &KINDS[..CATALOGUED]
     }
 
-    /// The kinds that the catalogue lacks.
+    /// Returns the kinds that the catalogue lacks.
     pub(crate) fn foreign() -> &'static [Kind] {
         &KINDS[CATALOGUED..]
     }
 
-    /// Whether the catalogue of effects has it.
+    /// Whether the catalogue of effects contains the kind.
     pub(crate) fn is_catalogued(self) -> bool {
         (self as usize) < CATALOGUED
     }
 
-    /// The kind of this name.
+    /// Returns the kind of this name.
     pub(crate) fn named(name: &str) -> Option<Kind> {
         KINDS.iter().copied().find(|k| k.spec().name == name)
     }
@@ -185,21 +189,21 @@ impl Kind {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Cause {
     pub(crate) kind: Kind,
-    /// Family of its form; causes outside the catalogue are always written.
+    /// Family of the form. Causes outside the catalogue always have hand-written forms.
     pub(crate) family: Family,
-    /// Which of the written forms.
+    /// Index of the hand-written form.
     pub(crate) form: usize,
-    /// Leading parameter, without its sign; units as in the catalogue.
+    /// Main parameter without its sign, in the unit of the catalogue.
     pub(crate) strength: f64,
     pub(crate) sign: f64,
-    /// Uniform numbers that determine the remaining freedom of the form.
+    /// Uniform random numbers for the secondary parameters of the form.
     pub(crate) aux: [f64; 3],
-    /// Seed of what is random inside the cause.
+    /// Seed of the random numbers of this cause.
     pub(crate) seed: u64,
 }
 
 impl Cause {
-    /// A drawn form, sign and secondary parameters; the strength is still at its maximum.
+    /// Draws form, sign and secondary parameters. The strength is set to its maximum.
     pub(crate) fn draw(kind: Kind, family: Family, random: &mut RandomGenerator) -> Self {
         let form = random.below(kind.spec().forms.len());
         let negative = kind.spec().negative > 0.0 && random.unit() < 0.5;
@@ -212,44 +216,44 @@ impl Cause {
         cause
     }
 
-    /// Name of its form: of the written one, else of the family.
+    /// Returns the name of a hand-written form, or else of the family.
     pub(crate) fn form_name(&self) -> &'static str {
         if self.is_drawn() { self.family.name() } else { self.kind.spec().forms[self.form] }
     }
 
-    /// Whether its form is drawn from a function space.
+    /// Whether the form is drawn from a function space.
     pub(crate) fn is_drawn(&self) -> bool {
         self.family != Family::Written
     }
 
-    /// Random numbers of its form: the same at every strength.
+    /// Returns the random generator of the form. It does not depend on the strength.
     pub(crate) fn random(&self, purpose: u64) -> RandomGenerator {
         RandomGenerator::new(self.seed, 1000 + purpose)
     }
 
-    /// Greatest strength in the direction of its sign.
+    /// Returns the greatest strength with the sign of this cause.
     pub(crate) fn most(&self) -> f64 {
         let spec = self.kind.spec();
         if self.sign < 0.0 { spec.most * spec.negative } else { spec.most }
     }
 
-    /// The same cause at another strength.
+    /// Returns the same cause at another strength.
     pub(crate) fn at(self, strength: f64) -> Self {
         Self { strength, ..self }
     }
 
-    /// Strength with its sign.
+    /// Returns the strength with its sign.
     pub(crate) fn signed(&self) -> f64 {
         self.sign * self.strength
     }
 
-    /// Log-uniform secondary parameter from one of the uniform numbers.
+    /// Returns a log-uniform secondary parameter, computed from one of the uniform numbers.
     pub(crate) fn log_aux(&self, index: usize, low: f64, high: f64) -> f64 {
         low * (high / low).powf(self.aux[index])
     }
 }
 
-/// The causes at work in a rig, found by kind.
+/// The active causes of a rig.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Causes(Vec<Cause>);
 

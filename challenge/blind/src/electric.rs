@@ -1,29 +1,31 @@
-//! Laws of the electrical side that are more than a curve: knees, clipping, softening.
+//! Effects of the electrical side that a static curve does not describe: knees, clipping and
+//! softening.
 
 use crate::curve::Curve;
 use crate::effect::{Cause, Family};
 use crate::laws::{Law, rising, settling};
 use crate::random::RandomGenerator;
 
-/// max(x, floor), rounded off: a function that does not, or hardly, fall below a floor.
+/// A rounded max(x, floor): a function that falls below a floor not at all or only slightly.
 #[derive(Debug, Clone)]
 pub(crate) enum Knee {
-    /// By a parabola of this half-width.
+    /// The corner is a parabola of this half-width.
     Parabola(f64),
-    /// The slope goes from a small rest to 1 over a width, as a drawn law rises.
+    /// The slope rises from a small value (`rest`) to 1 over a width. A drawn law gives its course.
     Drawn {
-        /// Integral of the slope over -1..1 in units of the half-width (x = (u + 1) / 2).
+        /// Integral of the slope over u from -1 to 1, in half-widths, as a table over (u + 1) / 2.
         turn: Curve,
-        /// Shift of the knee's middle with which the far line passes through the floor.
+        /// Shift of the knee's middle, in half-widths. With this shift, the line far above the knee
+        /// is y = x.
         offset: f64,
         width: f64,
-        /// Slope that is left below the floor.
+        /// Slope below the floor.
         rest: f64,
     },
 }
 
 impl Knee {
-    /// The knee of a sleeve that goes slack, around a strain.
+    /// Returns the knee in the strain of a sleeve that goes slack.
     pub(crate) fn of_slack(c: &Cause) -> Self {
         match (c.is_drawn(), c.form) {
             (true, _) => Self::draw(c.family, 0.003, 0.04, c.strength, &mut c.random(1)),
@@ -32,10 +34,10 @@ impl Knee {
         }
     }
 
-    /// A knee with a half-width log-uniform between `low` and `high`, and no wider than `most`.
+    /// Draws a knee whose half-width is log-uniform between `low` and `high`, and at most `most`.
     fn draw(family: Family, low: f64, high: f64, most: f64, random: &mut RandomGenerator) -> Self {
         let slope = rising(family, random);
-        // Twice: u runs over an interval of length 2.
+        // The factor of 2 is the length of the interval of u.
         let turn = slope.integral().times(2.0);
         let offset = 1.0 - turn.at(1.0);
         let rest = match family {
@@ -46,7 +48,7 @@ impl Knee {
         Self::Drawn { turn, offset, width: random.log_between(low, high).min(most), rest }
     }
 
-    /// What is left of `x` over a floor.
+    /// Returns the rounded max(x, floor).
     pub(crate) fn at_least(&self, x: f64, floor: f64) -> f64 {
         let above = x - floor;
         match self {
@@ -72,7 +74,8 @@ impl Knee {
 #[derive(Debug, Clone)]
 pub(crate) struct Saturation {
     knee: Knee,
-    /// Depth at top and bottom, V; `None` where it does not clip.
+    /// Distance of the clipping levels from the ends of the range, at top and bottom, V; `None` if
+    /// that end is not clipped.
     top: Option<f64>,
     bottom: Option<f64>,
 }
@@ -97,7 +100,7 @@ impl Saturation {
         Self { knee, top, bottom }
     }
 
-    /// A voltage whose range from `bottom` to `top` is clipped.
+    /// Clips a voltage whose nominal range is from `bottom` to `top`.
     pub(crate) fn clip(&self, volts: f64, bottom: f64, top: f64) -> f64 {
         let mut v = volts;
         if let Some(depth) = self.top {
@@ -110,17 +113,18 @@ impl Saturation {
     }
 }
 
-/// A gauge that gets weaker with travel.
+/// A gauge whose response weakens with the distance travelled.
 #[derive(Debug, Clone)]
 pub(crate) struct Softening {
     strength: f64,
     law: Law,
-    /// Travel in which it softens, and the travel so far.
+    /// Scale of the travel over which the response weakens, and the travel so far.
     turn: f64,
     travel: f64,
-    /// Weight of stretching; relaxing has the rest of 2.
+    /// Weight of travel while the gauge is stretched. Travel in the other direction has the weight
+    /// 2 - `stretching`.
     stretching: f64,
-    /// Time in which travel is forgotten, s.
+    /// Time constant with which past travel decays, s.
     memory_s: f64,
 }
 
@@ -149,12 +153,13 @@ impl Softening {
         softening
     }
 
-    /// Travel counts from here.
+    /// Begins a session: sets the travel to 0.
     pub(crate) fn begin_session(&mut self) {
         self.travel = 0.0;
     }
 
-    /// Share of its response that the gauge has lost after a strain moved in `h` s.
+    /// Adds a change of strain that took `h` s. Returns the share of the response that the gauge
+    /// has lost.
     pub(crate) fn push(&mut self, moved: f64, h: f64) -> f64 {
         let counts = if moved > 0.0 { self.stretching } else { 2.0 - self.stretching };
         self.travel += counts * moved.abs() - self.travel * h / self.memory_s;
@@ -184,7 +189,7 @@ mod tests {
                 for i in 1..=4000 {
                     let x = -1.0 + f64::from(i) * 5e-4;
                     let y = knee.at_least(x, 0.2);
-                    // A slope between 0 and 1.
+                    // The slope is between 0 and 1.
                     assert!(y >= last - 1e-12 && y <= last + 5e-4 + 1e-9, "{family} {x}");
                     last = y;
                 }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Failure of the blind check, with its evidence.
+/// Reason why the blind check failed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum BlindError {
@@ -11,23 +11,23 @@ pub enum BlindError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the operating system.
         source: std::io::Error,
     },
-    /// A JSON file is not what it should be.
+    /// A JSON file is invalid.
     #[error("{path}: {source}")]
     Json {
-        /// The file, or the name of the text.
+        /// Path of the file, or name of the text.
         path: PathBuf,
-        /// What the parser said.
+        /// Error of the parser.
         source: serde_json::Error,
     },
-    /// The sealed labels are not the ones whose hash was printed.
+    /// The hash of the labels differs from the one that was printed when they were sealed.
     #[error("the seal is broken: labels hash to {found}, the seal says {sealed}")]
     SealBroken {
         /// Hash written when the cases were made.
         sealed: String,
-        /// Hash of the labels as they are now.
+        /// Present hash of the labels.
         found: String,
     },
     /// The folder already holds a sealed set of cases.
@@ -41,15 +41,15 @@ pub enum BlindError {
     NoRig {
         /// Number of the case.
         case: usize,
-        /// How many rigs were drawn.
+        /// Number of rigs that were drawn.
         tries: usize,
     },
-    /// A diagnosis, a field of a submission or of a family of forms is not what it should be.
+    /// A diagnosis, a field of a submission or a family of forms is invalid.
     #[error("{field}: {reason}")]
     Field {
-        /// The case, or the field with its place: `cases.case-003.probabilities`.
+        /// The case, or the path of the field, such as `cases.case-003.probabilities`.
         field: String,
-        /// What is wrong with it, and what to do.
+        /// What is wrong, and what to do.
         reason: String,
     },
 }

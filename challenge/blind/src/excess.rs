@@ -1,4 +1,5 @@
-//! Strength of a case: the excess over the noise that re-tuning the nominal rig would leave.
+//! Computes the strength of a case: the excess (reduced chi-square minus one) that remains after
+//! the nominal rig is re-tuned.
 
 use crate::disturbances::Surroundings;
 use crate::effect::{Causes, Stage};
@@ -6,11 +7,12 @@ use crate::protocol::{Script, Split};
 use crate::rig::{L_0, L_STEP, Rig, UNCERTAIN, V_STEP};
 use crate::session::{COARSE, Conditions, Trace, run};
 
-/// Residuals and sensitivities of three channels (pressure, length, voltage), in noise units, for
-/// samples to fit and samples to test on.
+/// A residual or a sensitivity in the three channels pressure, length and voltage, in multiples of
+/// the noise, for all samples.
 type Channels = [Vec<f64>; 3];
 
-/// The nominal session of a rig, and its changes by parameters, computed when needed.
+/// The simulated session of a rig without effects, and the sessions with one parameter changed,
+/// which are computed when needed.
 #[derive(Debug)]
 pub(crate) struct Yardstick<'a> {
     rig: &'a Rig,
@@ -34,15 +36,16 @@ impl<'a> Yardstick<'a> {
         let nominal = run(rig, &Causes::default(), scripts, conditions, COARSE);
         let full = rig.static_contraction(rig.p_s() + crate::rig::P_ATM);
         let slope = (rig.volts(full) - rig.volts(0.0)) / (full * L_0);
-        // Length noise reaches the voltage of a gauge that is driven by the measured length.
+        // The simulated gauge is driven by the measured length, so noise of the length reaches its
+        // voltage.
         let volts = sigma_v.powi(2) + V_STEP.powi(2) / 12.0 + (slope * sigma_l).powi(2);
         let noise = [sigma_p, (sigma_l.powi(2) + L_STEP.powi(2) / 12.0).sqrt(), volts.sqrt()];
         let moved = vec![None; UNCERTAIN.len()];
         Self { rig, scripts, conditions, pressure_column, nominal, moved, noise }
     }
 
-    /// Excess summed over the channels on the test trials, after the nominal parameters explained
-    /// what they can of the gap in the fit trials; and the smallest strain that occurred.
+    /// Returns the excess on the test trials, summed over the channels, and the smallest strain.
+    /// The nominal parameters are first re-tuned on the fit trials.
     pub(crate) fn excess(&mut self, causes: &Causes) -> (f64, f64) {
         let truth = run(self.rig, causes, self.scripts, self.conditions, COARSE);
         let least = truth.iter().map(|t| t.least_strain).fold(f64::INFINITY, f64::min);
@@ -66,7 +69,7 @@ impl<'a> Yardstick<'a> {
         (excess, least)
     }
 
-    /// Sample numbers, with all trials concatenated, that belong to a split.
+    /// Returns the indices of the samples of a split in all trials concatenated.
     fn samples(&self, split: Split) -> impl Iterator<Item = usize> + '_ {
         let mut begin = 0;
         self.scripts.iter().flat_map(move |script| {
@@ -91,7 +94,8 @@ impl<'a> Yardstick<'a> {
             .collect()
     }
 
-    /// Residual of the nominal rig in each channel, with every stage fed with its measured input.
+    /// Returns the residual of the nominal rig in each channel. Every stage is driven by its
+    /// measured input.
     fn residual(&self, truth: &[Trace]) -> Channels {
         let is_measured = self.pressure_column;
         let pressure = match is_measured {
@@ -107,7 +111,7 @@ impl<'a> Yardstick<'a> {
         [pressure, length, volts]
     }
 
-    /// Whether a parameter can explain any of the residual.
+    /// Whether a parameter can explain a part of the residual.
     fn shows(&self, stage: Stage, name: &str, residual: &Channels) -> bool {
         let alive = |c: usize| residual[c].iter().any(|r| r.abs() > 1e-3);
         match stage {
@@ -118,7 +122,7 @@ impl<'a> Yardstick<'a> {
         }
     }
 
-    /// Change of every channel for one standard deviation of a parameter.
+    /// Returns the change of every channel by one standard deviation of a parameter.
     fn sensitivity(&mut self, index: usize, truth: &[Trace]) -> Channels {
         let parameter = &UNCERTAIN[index];
         let step = 0.25 * parameter.sd;
@@ -150,8 +154,9 @@ impl<'a> Yardstick<'a> {
         [pressure, length, zero()]
     }
 
-    /// Shifts of the parameters, in standard deviations, that explain the residual of the fit
-    /// trials best: least squares with the tolerance as prior, and a bound of three.
+    /// Returns the shifts of the parameters, in standard deviations, that best explain the residual
+    /// of the fit trials: least squares with the tolerances as prior and bounds of three standard
+    /// deviations.
     fn retune(&self, residual: &Channels, columns: &[Channels]) -> Vec<f64> {
         let n = columns.len();
         let mut normal = vec![vec![0.0; n]; n];
@@ -184,8 +189,8 @@ impl<'a> Yardstick<'a> {
     }
 }
 
-/// Minimiser of 0.5 x'Ax - b'x with every |x| at most `bound`, A positive definite: cyclic
-/// projected descent.
+/// Minimises 0.5 x'Ax - b'x with every |x_i| at most `bound`, for a positive definite A, by cyclic
+/// coordinate descent with projection.
 fn bounded(a: &[Vec<f64>], b: &[f64], bound: f64) -> Vec<f64> {
     let mut x = vec![0.0; b.len()];
     for _ in 0..20_000 {

@@ -1,5 +1,6 @@
-//! Friction loops: by Dahl, by Bouc and Wen, and slip elements of spread strength; drawn as plays of a
-//! random distribution, rate laws, and reaches that differ by direction.
+//! Friction loops. The hand-written forms are those of Dahl, of Bouc and Wen, and sums of six slip
+//! elements. The drawn forms are sums of plays with random radii, rate laws, and plays whose reach
+//! depends on the direction.
 
 use crate::curve::{Wiggle, weights};
 use crate::effect::Cause;
@@ -7,7 +8,8 @@ use crate::effect::Family;
 use crate::laws::sign;
 use crate::random::RandomGenerator;
 
-/// One play: its share, its reach when rising and when falling, its position.
+/// One play operator: its share of the sum, its reach while x rises and while x falls, and its
+/// state.
 #[derive(Debug, Clone, Copy)]
 struct Element {
     share: f64,
@@ -16,17 +18,19 @@ struct Element {
     at: f64,
 }
 
-/// How the loop turns at a reversal.
+/// The course of the loop after a reversal.
 #[derive(Debug, Clone)]
 enum Law {
-    /// z = sum of shares times x - play(x, r), over `whole`.
+    /// z is the sum of share (x - play(x, r)) over the elements, divided by `whole`.
     Plays { elements: Vec<Element>, whole: f64 },
-    /// dz = dx (1 - turn |z / r|^n), turn = a + (1 - a) sgn(dx z) (Bouc, Wen), or
-    /// dz = dx (1 - sgn(dx) z / r)^n (Dahl); r grows towards rest (Stribeck, as in LuGre).
+    /// Bouc and Wen: dz = dx (1 - turn |z / r|^n), turn = a + (1 - a) sgn(dx z). Dahl: dz = dx (1 -
+    /// sgn(dx) z / r)^n. The reach r is larger at low speed (Stribeck effect, as in the LuGre
+    /// model).
     Rate { dahl: bool, exponent: f64, share: f64, rest: f64, speed: f64, z: f64 },
 }
 
-/// A loop: follows a change at first with slope 1, then stays at its reach.
+/// A loop. After a reversal its output first changes as much as the input, and then saturates at
+/// `reach`.
 #[derive(Debug, Clone)]
 pub(crate) struct Friction {
     law: Law,
@@ -35,7 +39,7 @@ pub(crate) struct Friction {
 }
 
 impl Friction {
-    /// The loop of a cause.
+    /// Returns the loop of a cause.
     pub(crate) fn of(cause: &Cause, reach: f64, sharp: bool) -> Self {
         match cause.is_drawn() {
             true => Self::draw(cause.family, reach, sharp, &mut cause.random(2)),
@@ -43,14 +47,15 @@ impl Friction {
         }
     }
 
-    /// The strength of a cause, and its loop with a reach in strain.
+    /// Returns the strength of a cause, and a loop whose reach is a strain.
     pub(crate) fn with_strength(cause: &Cause) -> (f64, Self) {
         (cause.strength, Self::of(cause, 0.58 * cause.log_aux(0, 0.006, 0.05), false))
     }
 
-    /// Form 0 is Dahl's (1968), 1 Bouc's and Wen's (1976), otherwise six slip elements; `reach` is
-    /// where it saturates. `spread` in 0..1 sets the remaining freedom of the form; `sharp` loops
-    /// turn within their reach.
+    /// Returns a hand-written form: 0 is that of Dahl (1968), 1 that of Bouc and Wen (1976), any
+    /// other six slip elements. The loop saturates at `reach`. `spread` (0 to 1) sets the secondary
+    /// parameter of the form. A `sharp` loop changes direction within its reach, as a backlash
+    /// does.
     fn written(form: usize, reach: f64, spread: f64, sharp: bool) -> Self {
         let rate = |dahl, exponent, share| Law::Rate {
             dahl,
@@ -67,7 +72,8 @@ impl Friction {
             1 => rate(false, 1.2 + 0.6 * spread, 0.6),
             _ => {
                 let width = if sharp { 0.25 } else { 1.1 + 0.4 * spread };
-                // Quantiles of a log-uniform spread, scaled so that they sum to six reaches.
+                // The radii are quantiles of a log-uniform distribution, scaled such that their sum
+                // is six reaches.
                 let raw: [f64; 6] =
                     std::array::from_fn(|i| (width * (2.0 * (i as f64 + 0.5) / 6.0 - 1.0)).exp());
                 let mean = raw.iter().sum::<f64>() / 6.0;
@@ -79,7 +85,7 @@ impl Friction {
         Self { law, reach, last: None }
     }
 
-    /// A loop of a family; `sharp` ones turn within their reach, as a backlash does.
+    /// Draws a loop of a family; for `sharp` see `written`.
     pub(crate) fn draw(
         family: Family,
         reach: f64,
@@ -103,12 +109,13 @@ impl Friction {
         };
         let share = random.between(0.5, 0.9);
         let rest = if random.unit() < 0.5 { random.between(0.1, 0.4) } else { 0.0 };
-        // In reaches a second.
+        // The speed is in reaches per second.
         let speed = random.log_between(2.0, 40.0);
         Law::Rate { dahl, exponent, share, rest, speed, z: 0.0 }
     }
 
-    /// Takes the next value, `h` seconds after the last; returns what the loop holds back.
+    /// Advances to the next input, `h` seconds after the last one. Returns the part of the input
+    /// that friction holds back.
     pub(crate) fn push(&mut self, x: f64, h: f64) -> f64 {
         let dx = x - self.last.replace(x).unwrap_or(x);
         if self.reach <= 0.0 {
@@ -143,17 +150,17 @@ impl Friction {
     }
 }
 
-/// Plays whose shares sum to 1 and whose mean reach is 1.
+/// Draws plays whose shares sum to 1 and whose mean reach is 1.
 fn plays(family: Family, sharp: bool, random: &mut RandomGenerator) -> Vec<Element> {
     let mut radii: Vec<(f64, f64)> = match family {
-        // A density of radii that is a random spline.
+        // The logarithm of the density of the radii is a random spline.
         Family::Splines => {
             let (low, high) = if sharp { (0.6, 1.4) } else { (0.1, 2.2) };
             let density = Wiggle::draw(4, 0.8, random);
             let at = |i: usize| (i as f64 + 0.5) / 10.0;
             (0..10).map(|i| (low + (high - low) * at(i), density.at(at(i)).exp())).collect()
         }
-        // A power law of radii, shaken.
+        // The shares follow a power law of the radius, multiplied by random weights.
         Family::Spectra => {
             let decades = if sharp { random.between(0.15, 0.4) } else { random.between(0.7, 1.6) };
             let power = random.between(-0.4, 1.0);
@@ -221,7 +228,8 @@ mod tests {
                 for i in 1..400 {
                     up = one.push(1e-6 + 0.001 * f64::from(i), 1e-3);
                 }
-                // Directions may differ by 0.65 of the reach, the Stribeck peak is below 0.2.
+                // The two directions may differ by 0.65 of the reach. The Stribeck effect adds less
+                // than 0.2.
                 assert!(up < 1.66 * 0.02 && up > 0.33 * 0.02, "{family} {up}");
                 assert!(one.push(0.395, 1e-3) < up, "{family}: nothing at a reversal");
             }

@@ -1,4 +1,4 @@
-//! Sleeve, gauge, bridge and amplifier, and the potentiometer.
+//! Simulates sleeve, gauge, bridge and amplifier, and the potentiometer.
 
 use std::f64::consts::PI;
 
@@ -10,10 +10,10 @@ use crate::laws::{Law, bump, path, rising, settling};
 use crate::random::RandomGenerator;
 use crate::rig::{L_0, P_ATM, P_REF, Rig, V_STEP};
 
-/// Length of a session that a drift is tabled for, s.
+/// Length of a session in the table of a drift, s.
 const SESSION_S: f64 = 735.0;
 
-/// One instant of the mechanics: contraction, absolute pressure, openings.
+/// State of the mechanics at one time: contraction, absolute pressure, openings.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Instant {
     pub(crate) k: f64,
@@ -21,13 +21,14 @@ pub(crate) struct Instant {
     pub(crate) openings: (f64, f64),
 }
 
-/// The electrical side with its memories.
+/// The electrical side with its internal states.
 #[derive(Debug, Clone)]
 pub(crate) struct Gauge<'a> {
     rig: &'a Rig,
     causes: Causes,
     active: bool,
-    /// The floor of the strain over its least nominal one, and its knee.
+    /// Difference between the strain at which the sleeve goes slack and the smallest nominal
+    /// strain, and the form of the knee.
     slack: Option<(f64, Knee)>,
     slip: Option<Friction>,
     crosstalk: Option<(f64, Law)>,
@@ -36,7 +37,7 @@ pub(crate) struct Gauge<'a> {
     softening: Option<Softening>,
     nonlinearity: Option<(f64, Law)>,
     drift: Option<(f64, Law)>,
-    /// Time constant in s, strength and law.
+    /// Time constant in s, and strength and law.
     heating: Option<(f64, (f64, Law))>,
     contact: (bool, RandomGenerator),
     saturation: Option<Saturation>,
@@ -99,12 +100,12 @@ impl<'a> Gauge<'a> {
         }
     }
 
-    /// Whether any cause acts here; without one the voltage is a function of contraction.
+    /// Whether any cause acts here. Otherwise the voltage is a function of the contraction.
     pub(crate) fn active(&self) -> bool {
         self.active
     }
 
-    /// Excitation on: the amplifier settles, the travel counts on.
+    /// Switches the excitation on: the amplifier settles, and the travel is kept.
     pub(crate) fn power_up(&mut self) {
         if let Some(lags) = &mut self.lowpass {
             lags.reset();
@@ -113,15 +114,15 @@ impl<'a> Gauge<'a> {
         self.pickup = (0.0, (0.0, 0.0));
     }
 
-    /// The session begins: travel counts from here.
+    /// Begins a session: sets the travel to 0.
     pub(crate) fn begin_session(&mut self) {
         if let Some(softening) = &mut self.softening {
             softening.begin_session();
         }
     }
 
-    /// Analogue voltage after `h` seconds; `t` since the trial's, `session` since the session's
-    /// start.
+    /// Returns the analogue voltage after `h` seconds. `t` is the time since the start of the
+    /// trial, `session` that since the start of the session.
     pub(crate) fn step(&mut self, now: Instant, t: f64, session: f64, h: f64) -> f64 {
         if !self.active {
             return self.rig.volts(now.k);
@@ -171,7 +172,7 @@ impl<'a> Gauge<'a> {
             ohm *= 1.0
                 + strength
                     * match law {
-                        // In seconds of a steady drift.
+                        // The result is in seconds, because the strength is a rate per second.
                         Law::Drawn(law) => SESSION_S * law.at(session.max(0.0) / SESSION_S),
                         Law::Written(law) => law(session),
                     };
@@ -186,7 +187,7 @@ impl<'a> Gauge<'a> {
         }
         if let Some(c) = self.causes.find(Kind::IntermittentContact) {
             let (open, random) = &mut self.contact;
-            // Mean stay: 80 ms open, 1.5 s made.
+            // On average the contact stays open for 80 ms and closed for 1.5 s.
             let leave = h / if *open { 0.08 } else { 1.5 };
             if random.unit() < leave {
                 *open = !*open;
@@ -214,7 +215,7 @@ impl<'a> Gauge<'a> {
         }
         if let Some(c) = self.causes.find(Kind::AmplifierSlew) {
             let last = self.slewed.unwrap_or(v);
-            // The strength is the inverse of the rate: a larger strength is slower.
+            // The rate limit is 10/strength, so a larger strength is slower.
             let most = h * 10.0 / c.strength;
             v = last + (v - last).clamp(-most, most);
             self.slewed = Some(v);
@@ -223,7 +224,7 @@ impl<'a> Gauge<'a> {
     }
 }
 
-/// Effects of the converter on the samples: missing codes and frozen runs, V.
+/// Applies the effects of the converter to the samples, V: missing codes and frozen runs.
 pub(crate) fn spoil_samples(causes: &Causes, trial: usize, volts: &mut [f64]) {
     if let Some(c) = causes.find(Kind::MissingCodes) {
         let bit = 5 + (c.aux[0] * 3.0) as u32;
@@ -250,7 +251,7 @@ pub(crate) fn spoil_samples(causes: &Causes, trial: usize, volts: &mut [f64]) {
     }
 }
 
-/// The potentiometer with its memories.
+/// The potentiometer with its internal states.
 #[derive(Debug, Clone)]
 pub(crate) struct Pot<'a> {
     rig: &'a Rig,
@@ -277,7 +278,8 @@ impl<'a> Pot<'a> {
         }
     }
 
-    /// Shown length in mm at a contraction, `h` seconds after the last.
+    /// Returns the length that the potentiometer shows, mm, at a contraction, `h` seconds after the
+    /// previous call.
     pub(crate) fn step(&mut self, k: f64, h: f64) -> f64 {
         let mut length = L_0 * (1.0 - k);
         if let Some((strength, law)) = &self.nonlinearity {

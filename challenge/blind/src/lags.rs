@@ -1,12 +1,14 @@
-//! Lags: relaxation and low-pass filters, written as a few time constants; drawn as spectra of them, kernels of any shape,
-//! rates that depend on how far there is to go, and ones that differ by direction.
+//! Lags: relaxation and low-pass filters. The hand-written forms have a few time constants. The drawn forms have
+//! spectra of time constants, kernels of any shape, rates that depend on the distance from the target, or rates that
+//! depend on the direction.
 
 use crate::curve::{Wiggle, weights};
 use crate::effect::{Cause, Family};
 use crate::laws::sign;
 use crate::random::RandomGenerator;
 
-/// One lag: its share, its time constants rising and falling in s, its state.
+/// One first-order lag: its share of the sum, its time constants while rising and while falling
+/// (s), and its state.
 #[derive(Debug, Clone, Copy)]
 struct Part {
     share: f64,
@@ -21,30 +23,32 @@ impl Part {
     }
 }
 
-/// Weighted sum of lags, side by side or in a row; shares sum to 1.
+/// Weighted sum of lags in parallel or in series; the shares sum to 1.
 #[derive(Debug, Clone)]
 pub(crate) struct Lags {
     parts: Vec<Part>,
     in_a_row: bool,
-    /// Whether they are exact for an input that is constant over a step.
+    /// Whether the lags are exact for an input that is constant over a step.
     is_exact: bool,
-    /// Distance at which a lag runs twice as fast, and the power of that; 0 where it never does.
+    /// Distance from the target at which a lag is twice as fast, and the exponent of this
+    /// dependence. A distance of 0 means that the rate is constant.
     hurry: (f64, f64),
     settled: bool,
-    /// Dead time behind them, s, and the values of the past.
+    /// Dead time after the lags, s, and past values.
     dead_s: f64,
     late: Vec<f64>,
 }
 
 impl Lags {
-    /// Lags of so many s and shares.
+    /// Creates lags from pairs of a time constant (s) and a share.
     fn new(parts: impl IntoIterator<Item = (f64, f64)>, in_a_row: bool) -> Self {
         let parts = parts.into_iter().map(|(tau_s, share)| Part::even(share, tau_s)).collect();
         let (hurry, dead_s) = ((0.0, 1.0), 0.0);
         Self { parts, in_a_row, is_exact: false, hurry, settled: false, dead_s, late: Vec::new() }
     }
 
-    /// The relaxation of a cause around `tau` s; `scale` is the span of the input.
+    /// Returns the relaxation of a cause with time constants around `tau` s; `scale` is the span of
+    /// the input.
     pub(crate) fn relaxation(cause: &Cause, tau: f64, scale: f64) -> Self {
         match cause.is_drawn() {
             true => Self::draw_relaxation(cause.family, tau, scale, &mut cause.random(3)),
@@ -52,7 +56,8 @@ impl Lags {
         }
     }
 
-    /// Form 0: two time constants around `tau` s; else four, spread as a power law would be.
+    /// Returns a hand-written form: 0 has two time constants around `tau` s, any other has four,
+    /// which approximate a power law.
     fn written_relaxation(form: usize, tau: f64) -> Self {
         let shape: &[(f64, f64)] = match form {
             0 => &[(0.55, 0.45), (2.2, 0.55)],
@@ -61,7 +66,7 @@ impl Lags {
         Self::new(shape.iter().map(|(scale, share)| (tau * scale, *share)), false)
     }
 
-    /// Lags of a family around `tau` s; `scale` is the span of the input.
+    /// Draws lags of a family with time constants around `tau` s; `scale` is the span of the input.
     fn draw_relaxation(family: Family, tau: f64, scale: f64, random: &mut RandomGenerator) -> Self {
         let mut hurry = (0.0, 1.0);
         let raw: Vec<(f64, f64)> = match family {
@@ -72,7 +77,7 @@ impl Lags {
                 let at = |i: i32| f64::from(i) / 6.0;
                 (0..7).map(|i| (10f64.powf(1.6 * at(i) - 0.8), density.at(at(i)).exp())).collect()
             }
-            // A few of them anywhere in two decades, or a power law.
+            // Two to five time constants anywhere in two decades, or (below) a power law.
             Family::Spectra if random.unit() < 0.5 => {
                 let count = 2 + random.below(4);
                 let shares = weights(count, 0.8, random);
@@ -107,7 +112,7 @@ impl Lags {
         lags
     }
 
-    /// The low pass of a cause; its strength is the mean delay in s.
+    /// Returns the low pass of a cause. The strength is its mean delay, s.
     pub(crate) fn low_pass(cause: &Cause) -> Self {
         let tau = cause.strength;
         if cause.is_drawn() {
@@ -120,7 +125,7 @@ impl Lags {
         Self { is_exact: true, dead_s, ..Self::new(parts.iter().copied(), true) }
     }
 
-    /// A low pass whose mean delay is `delay` s.
+    /// Draws a low pass whose mean delay is `delay` s.
     fn draw_low_pass(family: Family, delay: f64, random: &mut RandomGenerator) -> Self {
         let mut lags = match family {
             Family::Written => Self::new([(1.0, 1.0)], true),
@@ -129,19 +134,19 @@ impl Lags {
             Family::Splines => {
                 Self::new(weights(4, 0.8, random).into_iter().map(|w| (1.0, w)), true)
             }
-            // Poles side by side over more than a decade.
+            // Two to five poles in parallel, spread over more than a decade.
             Family::Spectra => {
                 let count = 2 + random.below(4);
                 let poles: Vec<f64> = (0..count).map(|_| random.log_between(0.25, 4.0)).collect();
                 Self::new(poles.into_iter().zip(weights(count, 0.6, random)), false)
             }
-            // Two to four poles in a row, shared out at random.
+            // Two to four poles in series, whose time constants have random ratios.
             Family::RateLaws => {
                 let order = 2 + random.below(3);
                 let poles = weights(order, 0.8, random).into_iter().enumerate();
                 Self::new(poles.map(|(i, p)| (p, f64::from(i + 1 == order))), true)
             }
-            // Rises slower than it falls, or the other way round.
+            // The rise is slower than the fall, or faster.
             Family::Asymmetric => {
                 let mut one = Self::new([(1.0, 1.0)], true);
                 let ratio = random.log_between(1.2, 1.8).powf(sign(random)).sqrt();
@@ -163,13 +168,14 @@ impl Lags {
         lags
     }
 
-    /// Forgets what it heard: the next value settles it.
+    /// Clears the state: the lags start settled at the next input.
     pub(crate) fn reset(&mut self) {
         self.settled = false;
         self.late.clear();
     }
 
-    /// Advances by `h` seconds at input `x` (starts settled); gives the lagged value.
+    /// Advances by `h` seconds at the input `x` and returns the lagged value. The lags start
+    /// settled.
     pub(crate) fn push(&mut self, x: f64, h: f64) -> f64 {
         if !self.settled {
             self.parts.iter_mut().for_each(|part| part.at = x);
@@ -194,7 +200,8 @@ impl Lags {
         if self.dead_s == 0.0 {
             return sum;
         }
-        // The value of the dead time ago, interpolated; the first one before that.
+        // Returns the value one dead time ago, by linear interpolation; before that time, the first
+        // value.
         self.late.push(sum);
         let last = self.late.len() - 1;
         let at = (last as f64 - self.dead_s / h).max(0.0);
@@ -251,7 +258,8 @@ mod tests {
             for _ in 0..20 {
                 let mut filter = Lags::draw_low_pass(family, 0.05, &mut random);
                 filter.push(0.0, 1e-4);
-                // Integral of 1 - step response; uneven ones rise with their own constant.
+                // The delay is the integral of 1 minus the step response. Lags that depend on the
+                // direction rise with the time constant for rising.
                 let delay: f64 = (0..40_000).map(|_| (1.0 - filter.push(1.0, 1e-4)) * 1e-4).sum();
                 let uneven =
                     if family == Family::Asymmetric { BLIND_UNEVEN_S } else { BLIND_DELAY_S };

@@ -1,4 +1,4 @@
-//! Static laws drawn from function spaces: rising ones, bumps, paths, and damping.
+//! Static laws drawn from function spaces: rising curves, bumps, drifts and damping.
 
 use crate::curve::{Curve, Wiggle, weights};
 use crate::effect::{Causes, Family, Kind};
@@ -12,8 +12,8 @@ pub(crate) enum Law {
 }
 
 impl Law {
-    /// The strength of a cause at work with its sign, and its law: drawn from its family by `draw`, or that of its
-    /// two written forms.
+    /// Returns the signed strength of an active cause, and its law: drawn by `draw` from its family, or one of its
+    /// two hand-written forms. `None` if the cause is not active.
     pub(crate) fn find(
         causes: &Causes,
         kind: Kind,
@@ -42,7 +42,7 @@ pub(crate) fn sign(random: &mut RandomGenerator) -> f64 {
     if random.unit() < 0.5 { -1.0 } else { 1.0 }
 }
 
-/// A law that rises from (0, 0) to (1, 1) and never falls.
+/// Draws a law that rises from (0, 0) to (1, 1) and never falls.
 pub(crate) fn rising(family: Family, random: &mut RandomGenerator) -> Curve {
     match family {
         Family::Written => Curve::table(|x| x),
@@ -50,7 +50,7 @@ pub(crate) fn rising(family: Family, random: &mut RandomGenerator) -> Curve {
             let slope = Wiggle::draw(4 + random.below(4), 0.6, random);
             Curve::risen(|x| slope.at(x).exp())
         }
-        // Elements that saturate or grow, each with a separate scale.
+        // A sum of exponentials that saturate or grow, each with a separate scale.
         Family::Spectra => {
             let count = 3 + random.below(4);
             let parts: Vec<(f64, f64)> = weights(count, 0.8, random)
@@ -61,7 +61,7 @@ pub(crate) fn rising(family: Family, random: &mut RandomGenerator) -> Curve {
                 parts.iter().map(|(w, s)| w * (-x / s).exp_m1() / (-1.0 / s).exp_m1()).sum()
             })
         }
-        // df/dx = (1 + c f)^m, or a power of x.
+        // The solution of df/dx = (1 + c f)^m, or a power of x.
         Family::RateLaws => {
             if random.unit() < 0.4 {
                 let exponent = random.log_between(0.6, 1.8);
@@ -72,14 +72,14 @@ pub(crate) fn rising(family: Family, random: &mut RandomGenerator) -> Curve {
             let mut f = 0.0;
             let mut path = vec![0.0];
             for _ in 0..steps {
-                // Until f = 1 the right side keeps its sign: 1 + c f > 0.
+                // The right side is positive up to f = 1, because 1 + c f > 0.
                 f += (1.0 + c * f).max(0.05).powf(m) / f64::from(steps) * reach(c, m);
                 path.push(f);
             }
             let top = f;
             Curve::table(|x| path[(x * f64::from(steps)) as usize] / top)
         }
-        // One or two kinks, or another power on either side of a point.
+        // A curve with one or two kinks, or with different exponents on the two sides of a point.
         Family::Asymmetric => {
             let at = random.between(0.25, 0.75);
             if random.unit() < 0.5 {
@@ -109,7 +109,7 @@ fn reach(c: f64, m: f64) -> f64 {
     (0..cells).map(inverse).sum::<f64>() / f64::from(cells)
 }
 
-/// A bump over 0..1 of size 1, near 0 at both ends.
+/// Draws a bump over 0..1 with the largest absolute value 1, near 0 at both ends.
 pub(crate) fn bump(family: Family, random: &mut RandomGenerator) -> Curve {
     let raw = match family {
         Family::Written => Curve::table(|x| 4.0 * x * (1.0 - x)),
@@ -130,7 +130,7 @@ pub(crate) fn bump(family: Family, random: &mut RandomGenerator) -> Curve {
             let (p, q) = (random.log_between(0.6, 1.7), random.log_between(0.6, 1.7));
             Curve::table(|x| x.powf(p) * (1.0 - x).powf(q))
         }
-        // A rounded tent whose top is anywhere; a flat stretch on one side.
+        // A rounded triangle whose top is not in the middle, with a flat part on one side.
         Family::Asymmetric => {
             let top = random.between(0.28, 0.72);
             let flat = random.between(0.0, 0.2);
@@ -151,9 +151,10 @@ pub(crate) fn bump(family: Family, random: &mut RandomGenerator) -> Curve {
     raw.times(1.0 / size)
 }
 
-/// Progress of a settling, over 1 - exp(-t/tau): rises from (0, 0) to (1, 1).
+/// Draws the course of a settling process as a function of s = 1 - exp(-t/tau). It rises from (0,
+/// 0) to (1, 1).
 ///
-/// A sum of exponentials is a sum of powers of exp(-t/tau).
+/// A sum of exponentials in t is a sum of powers of 1 - s.
 pub(crate) fn settling(family: Family, random: &mut RandomGenerator) -> Curve {
     match family {
         Family::Spectra => {
@@ -166,7 +167,7 @@ pub(crate) fn settling(family: Family, random: &mut RandomGenerator) -> Curve {
                 1.0 - parts.iter().map(|(w, scale)| w * (1.0 - s).powf(1.0 / scale)).sum::<f64>()
             })
         }
-        // dx/dt = -x^n: a hyperbola or a power law, (1 + t / (m tau))^-m.
+        // The solution of dx/dt = -x^n, a hyperbola or another power law: (1 + t / (m tau))^-m.
         Family::RateLaws => {
             let m = random.log_between(0.4, 3.0);
             // The table ends after twenty time constants.
@@ -177,7 +178,7 @@ pub(crate) fn settling(family: Family, random: &mut RandomGenerator) -> Curve {
     }
 }
 
-/// A drift over 0..1 that mostly goes from 0 to 1.
+/// Draws a drift over 0..1 that usually goes from 0 to 1.
 pub(crate) fn path(family: Family, random: &mut RandomGenerator) -> Curve {
     let raw = match family {
         Family::Written => Curve::table(|x| x),
@@ -217,13 +218,14 @@ pub(crate) fn path(family: Family, random: &mut RandomGenerator) -> Curve {
         }
     };
     let end = raw.at(1.0);
-    // A path that returns is scaled by its largest excursion.
+    // A drift that returns towards 0 is divided by its largest absolute value instead of its end
+    // value.
     let scale = if end.abs() > 0.4 * raw.size() { end } else { raw.size() };
     raw.times(1.0 / scale)
 }
 
-/// Damping force over speed in units of a tenth of the natural one, as a damping ratio times the
-/// speed; table over -2..2 (x = (u + 2) / 4).
+/// Draws a damping force, in the form of a damping ratio times the speed u. u is in tenths of the
+/// natural angular frequency (1/s); the table covers u from -2 to 2 with x = (u + 2) / 4.
 pub(crate) fn damping(family: Family, random: &mut RandomGenerator) -> Curve {
     let base = random.between(0.16, 0.3);
     let over = |force: &dyn Fn(f64) -> f64| Curve::table(|x| force(4.0 * x - 2.0));
@@ -237,7 +239,8 @@ pub(crate) fn damping(family: Family, random: &mut RandomGenerator) -> Curve {
             let w = weights(4, 0.7, random);
             over(&|u| {
                 let terms = [0.5, 1.0, 1.5, 2.0].iter().zip(&w);
-                // The root is linear at rest: its slope there would be infinite.
+                // The offset of 0.05 makes the square root linear near rest, where its slope would
+                // be infinite.
                 base * u * terms.map(|(n, w)| w * (u.abs() + 0.05).powf(n - 1.0)).sum::<f64>()
             })
         }

@@ -1,4 +1,4 @@
-//! Writes the cases, each in its folder, and seals their labels.
+//! Writes each case into a folder, and seals the labels.
 
 use std::{
     fmt::Write as _,
@@ -24,7 +24,7 @@ use crate::truth::Truth;
 /// catalogue. The same seed and plan give the same bytes, whatever the number of threads.
 /// `progress` is called with the number of finished cases, possibly from several threads.
 ///
-/// The returned SHA-256 is to be shown before any diagnosis runs.
+/// Publish the returned SHA-256 before any diagnosis runs.
 ///
 /// # Errors
 /// [`BlindError::Occupied`] when `dir` holds a seal already; [`BlindError::Io`] when a file
@@ -64,7 +64,7 @@ pub fn make(
     truth.seal(dir)
 }
 
-/// Writes a text, with the folders above it.
+/// Writes a text file, and creates its parent folders.
 pub(crate) fn write(path: &Path, text: &str) -> Result<(), BlindError> {
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder).map_err(BlindError::io(folder))?;

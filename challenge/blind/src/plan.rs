@@ -1,4 +1,4 @@
-//! How many cases of each kind.
+//! The number of cases of each kind.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,10 +6,10 @@ use crate::effect::{Family, Kind};
 use crate::random::RandomGenerator;
 use crate::truth::CaseKind;
 
-/// Numbers of cases by kind, the range of the strengths, and where forms come from.
+/// Numbers of cases by kind, the range of the strengths, and the family of the forms.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// One effect of the catalogue, every effect in turn.
+    /// Cases with one effect of the catalogue; the effects alternate.
     pub single: usize,
     /// No effect.
     pub null: usize,
@@ -17,13 +17,13 @@ pub struct Plan {
     pub compound: usize,
     /// One strong effect and three weak ones.
     pub dominant: usize,
-    /// An effect that the catalogue lacks, every one in turn.
+    /// Cases with an effect that the catalogue lacks; the effects alternate.
     pub out_of_catalogue: usize,
-    /// One effect whose entry is removed from the catalogue, every effect in turn.
+    /// Cases with one effect whose entry is removed from the catalogue; the effects alternate.
     pub struck: usize,
-    /// Smallest and largest excess aimed at, log-uniform between them.
+    /// Smallest and largest target of the excess, which is log-uniform between the two.
     pub excess: (f64, f64),
-    /// Family that every form is drawn from; `None` is every family in turn.
+    /// Family from which every form is drawn; `None` uses all families in turn.
     pub family: Option<Family>,
 }
 
@@ -57,13 +57,13 @@ impl Plan {
         }
     }
 
-    /// Cases in all.
+    /// Returns the total number of cases.
     #[must_use]
     pub fn cases(&self) -> usize {
         self.counts().map(|(_, count, _)| count).iter().sum()
     }
 
-    /// How many cases of every kind, and the effects that come in turn in them.
+    /// Returns for each kind the number of cases, and the effects that alternate in them.
     fn counts(&self) -> [(CaseKind, usize, &'static [Kind]); 6] {
         let known = Kind::catalogued();
         [
@@ -76,13 +76,14 @@ impl Plan {
         ]
     }
 
-    /// What each case is to be, in random order; half of every kind with a pressure column, the
-    /// families in turn for every kind and every effect.
+    /// Returns the specification of each case, in random order. Half of the cases of each kind have
+    /// a pressure column. The families alternate for each kind and effect.
     pub(crate) fn orders(&self, seed: u64) -> Vec<Order> {
         let mut random = RandomGenerator::new(seed, 0);
         let mut orders = Vec::with_capacity(self.cases());
         for (kind, count, pool) in self.counts() {
-            // Every effect in turn; with and without a pressure column in turn for each.
+            // The effects alternate. For each effect, cases with and without a pressure column
+            // alternate.
             let mut pool = pool.to_vec();
             random.shuffle(&mut pool);
             let first = random.below(2);
@@ -105,7 +106,8 @@ impl Plan {
     }
 }
 
-/// Gives every effect of every kind of case all families in turn, from one drawn for it.
+/// Sets the families of the cases: for each kind of case and each effect, all families in turn,
+/// beginning with a random one.
 fn rotate(orders: &mut [Order], seed: u64) {
     let mut random = RandomGenerator::new(seed, 1);
     let mut turns: Vec<((CaseKind, Option<Kind>), usize)> = Vec::new();
@@ -121,11 +123,11 @@ fn rotate(orders: &mut [Order], seed: u64) {
     }
 }
 
-/// What one case is to be.
+/// Specification of one case.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Order {
     pub(crate) kind: CaseKind,
-    /// Its (strongest) effect.
+    /// The effect, or the strongest of several.
     pub(crate) lead: Option<Kind>,
     pub(crate) pressure_column: bool,
     pub(crate) family: Family,

@@ -1,4 +1,4 @@
-//! Valves, chamber and muscle, integrated by the classical Runge-Kutta rule.
+//! Simulates valves, chamber and muscle by the classical Runge-Kutta method.
 
 use crate::curve::Curve;
 use crate::effect::{Cause, Causes, Kind};
@@ -8,11 +8,11 @@ use crate::laws::{damping, rising};
 use crate::pneumatics::{DeadBand, Delay, Q_REF, Sag};
 use crate::rig::{P_ATM, P_REF, R_T, RHO_0, Rig, V_0};
 
-/// Absolute pressure over (1 + theta), lagged contraction, contraction, its rate, sag of the
-/// supply in Pa, relative excess of the gas temperature.
+/// Absolute pressure divided by (1 + theta), lagged contraction, contraction, rate of the
+/// contraction, sag of the supply (Pa), and theta, the relative excess of the gas temperature.
 type State = [f64; 6];
 
-/// Pneumatics and muscle with their memories.
+/// Pneumatics and muscle with their internal states.
 #[derive(Debug, Clone)]
 pub(crate) struct Plant<'a> {
     rig: &'a Rig,
@@ -29,14 +29,15 @@ pub(crate) struct Plant<'a> {
     deadband: Option<(f64, DeadBand)>,
     delay: Option<(f64, Delay)>,
     causes: Causes,
-    /// Laws that are drawn.
+    /// Laws of drawn forms; `None` for hand-written forms and for causes that are not active.
     sag: Option<Sag>,
     leak: Option<Curve>,
     volume: Option<Curve>,
     damping: Option<Curve>,
 }
 
-/// Inputs of a step: conductance shares of the valves and the supply, Pa absolute.
+/// Inputs of a step: conductances of the two valves as shares of the full conductance, and the
+/// absolute supply pressure, Pa.
 #[derive(Debug, Clone, Copy)]
 struct Drive {
     inlet: f64,
@@ -82,12 +83,12 @@ impl<'a> Plant<'a> {
         self.state[2]
     }
 
-    /// Contraction of a muscle without any effect at the same pressure.
+    /// Contraction of a muscle without effects at the same pressure.
     pub(crate) fn shadow(&self) -> f64 {
         self.shadow
     }
 
-    /// Sets the pressure, as a regulator that holds it would.
+    /// Sets the pressure, as if a regulator held it.
     pub(crate) fn regulate(&mut self, p: f64) {
         self.state[0] = p;
         self.state[4] = 0.0;
@@ -97,7 +98,7 @@ impl<'a> Plant<'a> {
         }
     }
 
-    /// Conductance share of an opening, 0..1.
+    /// Returns the conductance at an opening (0..1), as a share of the full conductance.
     fn share(&self, u: f64, side: usize) -> f64 {
         let u = match &self.deadband {
             Some((strength, law)) => law.pass(u, *strength, side),
@@ -106,7 +107,8 @@ impl<'a> Plant<'a> {
         if u <= 0.0 { 0.0 } else { self.rig.u_min() + (1.0 - self.rig.u_min()) * u }
     }
 
-    /// Mean share of the `late` command over the step that begins at `t`.
+    /// Returns the mean conductance over the step that begins at `t`, if commands act `late`
+    /// seconds late.
     fn mean_share(
         &self,
         command: &impl Fn(f64) -> (f64, f64),
@@ -119,7 +121,7 @@ impl<'a> Plant<'a> {
             let (inlet, outlet) = command(time);
             self.share(if side == 0 { inlet } else { outlet }, side)
         };
-        // Commands change only at samples, so there is at most one change in a step.
+        // Commands change only at samples, so at most one change falls in a step.
         let rate = crate::protocol::RATE_HZ as f64;
         let begin = t - late;
         let change = (((begin + 1e-9) * rate).floor() + 1.0) / rate;
@@ -128,7 +130,7 @@ impl<'a> Plant<'a> {
         if before >= 1.0 { first } else { before * first + (1.0 - before) * at(change + 1e-9) }
     }
 
-    /// Conductance share of a valve over a step, with whatever delays it.
+    /// Returns the conductance of a valve over a step, including delays and sticking.
     fn valve(&mut self, command: &impl Fn(f64) -> (f64, f64), t: f64, h: f64, side: usize) -> f64 {
         let late = |late| self.mean_share(command, t, h, late, side);
         let mut lag = self.valve_lag[side];
@@ -143,7 +145,7 @@ impl<'a> Plant<'a> {
         self.valve_lag[side] = lag;
         if let Some(c) = self.causes.find(Kind::ValveSticking) {
             if c.form == 0 {
-                // The longer it was shut, the later it opens.
+                // The longer the valve was shut, the later it opens.
                 if share > 0.0 && self.shut_s[side] > 0.0 {
                     self.stuck_s[side] = c.strength * (1.0 - (-self.shut_s[side] / 1.2).exp());
                     self.shut_s[side] = 0.0;
@@ -164,7 +166,8 @@ impl<'a> Plant<'a> {
         share
     }
 
-    /// Change of the static contraction by the muscle's memories, fed once a step.
+    /// Returns the change of the static contraction by effects with memory. They are advanced once
+    /// per step.
     fn offset(&mut self, h: f64) -> f64 {
         let k = self.rig.static_contraction(self.pressure());
         let mut offset = 0.0;
@@ -183,7 +186,7 @@ impl<'a> Plant<'a> {
             offset += self.snap.1;
         }
         if let Some(c) = self.causes.find(Kind::MuscleFatigue) {
-            // Weaker after work, recovering with rest.
+            // The muscle weakens with the distance travelled and recovers with time.
             let moved = (k - self.last_static.unwrap_or(k)).abs();
             self.travel += moved - self.travel * h / (20.0 + 100.0 * c.aux[0]);
             offset -= c.strength * k * (self.travel / 1.5).tanh();
@@ -192,7 +195,7 @@ impl<'a> Plant<'a> {
         offset
     }
 
-    /// Flow that is lost at an absolute pressure, kg/s.
+    /// Returns the flow through the leak at an absolute pressure, kg/s.
     fn leak_flow(&self, c: Cause, p: f64) -> f64 {
         if let Some(law) = &self.leak {
             return c.strength * P_REF * law.at((p - P_ATM) / P_REF);
@@ -206,12 +209,12 @@ impl<'a> Plant<'a> {
         }
     }
 
-    /// Acceleration of a crossbeam of some inertia.
+    /// Returns the acceleration of the crossbeam.
     fn acceleration(&self, c: Cause, y: &State) -> f64 {
         let omega = 1.0 / c.strength;
         let spring = omega * omega * (y[1] - y[2]);
         if let Some(law) = &self.damping {
-            // Speeds count in tenths of the natural one.
+            // The speed is in tenths of the natural angular frequency.
             let u = y[3] / (0.1 * omega);
             return spring - 0.2 * omega * omega * law.at((u + 2.0) / 4.0);
         }
@@ -266,12 +269,13 @@ impl<'a> Plant<'a> {
         if let Some(c) = self.causes.find(Kind::AdiabaticGas) {
             d[5] = 0.4 * d[0] / y[0] - y[5] / c.strength;
         }
-        // A drawn sag is constant within a step.
+        // A drawn sag is constant within a step and not computed here.
         if let Some(c) = self.causes.find(Kind::SupplySag).filter(|c| !c.is_drawn()) {
             let tau = 0.25 + 0.5 * c.aux[0];
             let scale = c.strength * Q_REF;
             d[4] = match c.form {
-                // A reservoir behind a regulator that passes the root of its drop.
+                // A reservoir behind a regulator, whose flow is proportional to the square root of
+                // the pressure drop.
                 0 => {
                     let back = (y[4] / scale) / (y[4].abs() / scale + 0.01).sqrt();
                     scale / tau * (q_in / Q_REF - back)
@@ -285,7 +289,7 @@ impl<'a> Plant<'a> {
         d
     }
 
-    /// One step of `h` seconds from `t`; `command` gives the openings at a time.
+    /// Advances by one step of `h` seconds from `t`. `command` returns the openings at a time.
     pub(crate) fn step(
         &mut self,
         command: &impl Fn(f64) -> (f64, f64),

@@ -1,4 +1,5 @@
-//! Laws of the pneumatics: openings that act late, dead bands of any shape, and a supply that sags under load.
+//! Laws of the pneumatics: delays of the valves, dead bands of any shape, and a supply pressure that falls
+//! under load.
 
 use crate::curve::{Curve, weights};
 use crate::effect::Cause;
@@ -6,21 +7,22 @@ use crate::effect::Family;
 use crate::laws::{rising, sign};
 use crate::random::RandomGenerator;
 
-/// How a command reaches the valves.
+/// The delay between a command and the opening of a valve.
 #[derive(Debug, Clone)]
 pub(crate) enum Delay {
-    /// Later or earlier with the opening commanded: delay over opening, in units of the mean.
+    /// The delay depends on the commanded opening: delay in units of the mean, as a function of the
+    /// opening.
     Graded(Curve),
-    /// Several seats, each with a share and a delay.
+    /// The valve has several seats, each with a share of the conductance and a delay.
     Spread(Vec<(f64, f64)>),
-    /// A dead time, and a lag for the rest.
+    /// The share `dead` of the delay is a dead time, the rest a first-order lag.
     Lagged { dead: f64 },
-    /// Of inlet and outlet, opening and closing.
+    /// Separate delays of inlet and outlet, each for opening and closing.
     Sided([[f64; 2]; 2]),
 }
 
 impl Delay {
-    /// The delay of a cause.
+    /// Returns the delay of a cause.
     pub(crate) fn of(cause: &Cause) -> Self {
         match (cause.is_drawn(), cause.form) {
             (true, _) => Self::draw(cause.family, &mut cause.random(1)),
@@ -30,7 +32,7 @@ impl Delay {
         }
     }
 
-    /// Delays of a family, of mean 1.
+    /// Draws a delay of a family, with mean 1.
     fn draw(family: Family, random: &mut RandomGenerator) -> Self {
         match family {
             Family::Written => Self::Spread(vec![(1.0, 1.0)]),
@@ -57,8 +59,9 @@ impl Delay {
         }
     }
 
-    /// Mean share of a valve over a step of `h` s: `opening` is the current command, `late` the
-    /// mean share of the command that many seconds ago, `lag` the valve's memory.
+    /// Returns the mean conductance of a valve over a step of `h` s. `opening` is the current
+    /// command. `late` returns the mean conductance of the command a number of seconds ago. `lag`
+    /// is the state of the valve.
     pub(crate) fn share(
         &self,
         strength: f64,
@@ -79,8 +82,8 @@ impl Delay {
             }
             Self::Sided(factors) => {
                 let [opens, closes] = factors[side].map(|f| late(f * strength));
-                // A valve that opens more slowly is open if both are; one that closes more slowly
-                // is open if either is.
+                // A valve that opens more slowly than it closes is open if both delayed commands
+                // are. A valve that closes more slowly is open if either of them is.
                 if factors[side][0] > factors[side][1] {
                     opens.min(closes)
                 } else {
@@ -91,35 +94,36 @@ impl Delay {
     }
 }
 
-/// A dead band: what of a small opening is lost.
+/// A dead band: the part of a small opening that has no effect.
 #[derive(Debug, Clone)]
 pub(crate) enum DeadBand {
-    /// Shifted, or a spool that lifts gradually, so that the slowest ramp still passes; band of inlet and outlet,
-    /// in units of the strength.
+    /// The opening is shifted, or (`is_gradual`) the spool lifts gradually, so that the slowest ramp still has an
+    /// effect. `sides` are the bands of inlet and outlet in units of the strength.
     Written { is_gradual: bool, sides: [f64; 2] },
-    /// Lost opening over opening, both in bands, as a table over 0..4, where it is 1; band of inlet and outlet, in
-    /// units of the mean.
+    /// The lost opening as a function of the opening, both in units of the band: a table over 0 to 4, at whose end
+    /// it is 1. `sides` are the bands of inlet and outlet in units of their mean.
     Drawn { lost: Curve, sides: [f64; 2] },
 }
 
 impl DeadBand {
-    /// The dead band of a cause.
+    /// Returns the dead band of a cause.
     pub(crate) fn of(c: &Cause) -> Self {
         match c.is_drawn() {
             true => Self::draw(c.family, &mut c.random(1)),
-            // The two valves differ a little.
+            // The bands of the two valves differ slightly.
             false => Self::Written { is_gradual: c.form > 0, sides: [1.0, 0.8 + 0.4 * c.aux[0]] },
         }
     }
 
     fn draw(family: Family, random: &mut RandomGenerator) -> Self {
         let mut sides = [1.0, random.between(0.85, 1.15)];
-        // Shut up to `begin` bands; from there on the slope rises to 1 as a drawn law does.
+        // The valve is shut up to `begin` bands. Above that, the slope rises to 1; a drawn law
+        // gives its course.
         let begin = if random.unit() < 0.6 { random.between(0.3, 0.85) } else { 0.0 };
         let mut law = rising(family, random);
         let mut long = (1.0 - begin) / (1.0 - law.mean());
         if family == Family::Asymmetric {
-            // Hard, and the two valves far apart.
+            // The edge is abrupt, and the bands of the two valves differ much.
             sides = [random.between(0.6, 1.4), random.between(0.6, 1.4)];
             law = Curve::table(|_| 0.0);
             long = 1.0 - begin;
@@ -134,7 +138,7 @@ impl DeadBand {
         Self::Drawn { lost: lost.times(1.0 / end), sides }
     }
 
-    /// What is left of an opening.
+    /// Returns the opening that remains after the dead band.
     pub(crate) fn pass(&self, u: f64, band: f64, side: usize) -> f64 {
         match self {
             Self::Written { is_gradual: false, sides } => (u - band * sides[side]).max(0.0),
@@ -150,24 +154,25 @@ impl DeadBand {
     }
 }
 
-/// Flow at which the sag is scaled, kg/s.
+/// Reference flow, at which the strength of the sag is defined, kg/s.
 pub(crate) const Q_REF: f64 = 6e-4;
 
-/// Pressure missing behind the regulator.
+/// Sag: loss of pressure behind the regulator under flow.
 #[derive(Debug, Clone)]
 pub(crate) struct Sag {
-    /// Sag at rest under the reference flow, Pa.
+    /// Steady sag at the reference flow, Pa.
     scale: f64,
-    /// Sag over flow; table over 0 .. 2 of the reference flow.
+    /// Steady sag as a function of the flow, relative to `scale`; a table over 0 to 2 reference
+    /// flows.
     load: Curve,
-    /// Share, time constants falling and recovering in s, state in Pa.
+    /// Share, time constants (s) while the pressure falls and recovers, and state (Pa).
     parts: Vec<(f64, f64, f64, f64)>,
-    /// Power of the sag that drives the recovery.
+    /// Exponent of the sag in the rate of the recovery.
     power: f64,
 }
 
 impl Sag {
-    /// A sag of `strength` Pa s/kg at the reference flow.
+    /// Draws a sag of `strength` Pa s/kg at the reference flow.
     pub(crate) fn draw(family: Family, strength: f64, random: &mut RandomGenerator) -> Self {
         let tau = random.log_between(0.25, 0.9);
         let mut load = Curve::table(|x| 2.0 * x);
@@ -177,7 +182,7 @@ impl Sag {
             Family::Written => {}
             Family::Splines => {
                 load = rising(family, random);
-                // 1 at the reference flow, the middle of the table.
+                // The curve is scaled to 1 at the reference flow, which is the middle of the table.
                 let middle = load.at(0.5);
                 load = load.times(1.0 / middle);
             }
@@ -199,12 +204,12 @@ impl Sag {
         Self { scale: strength * Q_REF, load, parts, power }
     }
 
-    /// No load for long.
+    /// Sets the sag to 0, as after a long time without flow.
     pub(crate) fn reset(&mut self) {
         self.parts.iter_mut().for_each(|part| part.3 = 0.0);
     }
 
-    /// Pressure missing after `h` s of a flow in kg/s, Pa.
+    /// Advances by `h` s with a flow in kg/s. Returns the sag, Pa.
     pub(crate) fn push(&mut self, flow: f64, h: f64) -> f64 {
         let drawn = self.scale * self.load.at(flow / (2.0 * Q_REF));
         let mut sum = 0.0;
@@ -212,7 +217,8 @@ impl Sag {
             let back = if self.power == 1.0 {
                 *at
             } else {
-                // The root is straight below a thousandth: its slope there would be infinite.
+                // The offset of 1e-3 makes the power linear near 0, where its slope could be
+                // infinite.
                 let x = *at / self.scale;
                 self.scale * x * (x.abs() + 1e-3).powf(self.power - 1.0)
             };

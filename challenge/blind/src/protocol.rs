@@ -1,15 +1,15 @@
-//! The seventeen trials of a session and the openings commanded in them.
+//! The seventeen trials of a session, and their commanded valve openings.
 
 use serde::{Deserialize, Serialize};
 
 use crate::random::RandomGenerator;
 
-/// Samples a second.
+/// Samples per second.
 pub(crate) const RATE_HZ: usize = 100;
 /// Pause between trials, s.
 pub(crate) const PAUSE_S: f64 = 15.0;
 
-/// What a trial may be used for.
+/// The use of a trial.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Split {
@@ -17,7 +17,7 @@ pub(crate) enum Split {
     Test,
 }
 
-/// One trial as it is commanded.
+/// The commands of one trial.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Script {
     pub(crate) file: String,
@@ -25,9 +25,10 @@ pub(crate) struct Script {
     pub(crate) opening: Option<f64>,
     pub(crate) start_s: f64,
     pub(crate) split: Split,
-    /// Pause before it, s.
+    /// Pause before the trial, s.
     pub(crate) pause_s: f64,
-    /// Whether it starts settled at the supply pressure, else at the atmosphere.
+    /// Whether the trial starts settled at the supply pressure; otherwise it starts at the
+    /// atmosphere.
     pub(crate) from_full: bool,
     /// Inlet and outlet opening of every sample, 0..1.
     pub(crate) openings: Vec<(f64, f64)>,
@@ -36,8 +37,8 @@ pub(crate) struct Script {
 const RAMPS: [(f64, &str); 6] =
     [(0.0025, "0_25"), (0.125, "12_5"), (0.25, "25"), (0.5, "50"), (0.75, "75"), (1.0, "100")];
 
-/// The trials of a session: six inflations, six deflations, then two trials to fit and three to
-/// test.
+/// Returns the trials of a session: six inflations and six deflations, then two further trials for
+/// fitting and three for testing.
 pub(crate) fn session(random: &mut RandomGenerator) -> Vec<Script> {
     let mut scripts = Vec::new();
     let mut start_s = 0.0;
@@ -71,7 +72,7 @@ pub(crate) fn session(random: &mut RandomGenerator) -> Vec<Script> {
     scripts
 }
 
-/// The same session with other pauses.
+/// Returns the same session with other pauses.
 pub(crate) fn with_pauses(mut scripts: Vec<Script>, mut pause: impl FnMut() -> f64) -> Vec<Script> {
     let mut start_s = 0.0;
     for (i, script) in scripts.iter_mut().enumerate() {
@@ -79,14 +80,14 @@ pub(crate) fn with_pauses(mut scripts: Vec<Script>, mut pause: impl FnMut() -> f
             script.pause_s = pause();
             start_s += script.pause_s;
         }
-        // Written to a hundredth, as pauses are.
+        // Start times are rounded to 0.01 s, like the pauses.
         script.start_s = (start_s * 100.0).round() / 100.0;
         start_s += script.openings.len() as f64 / RATE_HZ as f64;
     }
     scripts
 }
 
-/// One second of rest, then one opening held to 15 s.
+/// One second of rest, then a constant opening until 15 s.
 fn ramp(opening: (f64, f64)) -> Vec<(f64, f64)> {
     (0..15 * RATE_HZ).map(|i| if i < RATE_HZ { (0.0, 0.0) } else { opening }).collect()
 }
@@ -115,7 +116,8 @@ fn arbitrary(random: &mut RandomGenerator) -> Vec<(f64, f64)> {
     openings
 }
 
-/// One minute of pulse pairs whose inner gap falls by 18 % a pair and starts over.
+/// One minute of pairs of pulses. The gap between the two pulses of a pair falls by 18 % with each
+/// pair, and then starts over.
 fn pulses(random: &mut RandomGenerator) -> Vec<(f64, f64)> {
     let vent = (0.0, random.pick(&[0.5, 0.75, 1.0]));
     let rest_s = random.between(0.3, 1.0);
@@ -147,7 +149,7 @@ mod tests {
         assert_eq!(scripts[13].start_s, 435.0);
         for script in &scripts {
             assert!(script.openings[..RATE_HZ].iter().all(|&u| u == (0.0, 0.0)));
-            // Never both valves at once.
+            // The two valves are never open at the same time.
             assert!(script.openings.iter().all(|&(i, o)| i * o == 0.0));
         }
     }

@@ -1,4 +1,4 @@
-//! Random numbers of one purpose in one case: one ChaCha stream each.
+//! Random numbers. Each purpose in each case has its own ChaCha stream.
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -8,14 +8,14 @@ use rand_chacha::rand_core::{Rng, SeedableRng};
 pub(crate) struct RandomGenerator(ChaCha8Rng);
 
 impl RandomGenerator {
-    /// Stream `stream` of `seed`: streams of one seed do not overlap.
+    /// Creates the generator of stream `stream` of `seed`. Streams of one seed do not overlap.
     pub(crate) fn new(seed: u64, stream: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream(stream);
         Self(rng)
     }
 
-    /// Any 64 bits.
+    /// Returns 64 random bits.
     pub(crate) fn bits(&mut self) -> u64 {
         self.0.next_u64()
     }
@@ -40,12 +40,13 @@ impl RandomGenerator {
         ((self.unit() * n as f64) as usize).min(n - 1)
     }
 
-    /// One of a list that is not empty.
+    /// Returns a random element of a list, which must not be empty.
     pub(crate) fn pick<T: Copy>(&mut self, list: &[T]) -> T {
         list[self.below(list.len())]
     }
 
-    /// Standard Gaussian (Box and Muller's polar-free form, one of the pair).
+    /// Returns a standard normal number by the basic form of Box and Muller, of which one of the
+    /// two numbers is used.
     pub(crate) fn gauss(&mut self) -> f64 {
         let radius = (-2.0 * (1.0 - self.unit()).ln()).sqrt();
         radius * (std::f64::consts::TAU * self.unit()).cos()

@@ -1,13 +1,13 @@
-//! Counts with their intervals, and the calibration of probabilities.
+//! Rates with their confidence intervals, and the calibration of probabilities.
 
 use serde::{Deserialize, Serialize};
 
-/// `hits` out of `cases`.
+/// A rate: `hits` out of `cases`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Rate {
-    /// How often it was right (or happened).
+    /// Number of cases that were right, or in which an event happened.
     pub hits: usize,
-    /// Out of how many.
+    /// Number of cases.
     pub cases: usize,
 }
 
@@ -17,13 +17,14 @@ impl Rate {
         self.cases += 1;
     }
 
-    /// hits / cases; `None` without a case.
+    /// Returns hits / cases; `None` if there is no case.
     #[must_use]
     pub fn share(&self) -> Option<f64> {
         (self.cases > 0).then(|| self.hits as f64 / self.cases as f64)
     }
 
-    /// Wilson's 95 % interval (1927) of the underlying probability; `None` without a case.
+    /// Returns the 95 % interval of Wilson (1927) of the underlying probability; `None` if there is
+    /// no case.
     ///
     /// ```
     /// let rate = stretch_blind::Rate { hits: 0, cases: 100 };
@@ -45,20 +46,21 @@ impl Rate {
 /// One bin of a reliability diagram.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Bin {
-    /// Lower and upper end of the probabilities in it.
+    /// Lower and upper end of the bin.
     pub range: (f64, f64),
-    /// Mean of the probabilities stated.
+    /// Mean of the stated probabilities.
     pub stated: f64,
-    /// How often the first candidate was right.
+    /// Rate at which the first candidate was right.
     pub right: Rate,
 }
 
-/// Stated probabilities against how often they came true.
+/// Comparison of stated probabilities with the rates at which the answers were right.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Calibration {
     /// Ten bins of equal width.
     pub bins: Vec<Bin>,
-    /// Expected calibration error: mean of |stated - right| over the cases; `None` without one.
+    /// Expected calibration error: mean of |stated - right| over the bins, weighted by their cases;
+    /// `None` if there is no case.
     pub ece: Option<f64>,
 }
 
@@ -93,7 +95,7 @@ mod tests {
     fn calibration_error_is_the_weighted_gap() {
         let outcomes = [(0.95, true), (0.95, true), (0.55, false), (0.55, true)];
         let calibration = Calibration::of(outcomes);
-        // Half the cases are off by 0.05, half by 0.05.
+        // In both bins, which have the same number of cases, the difference is 0.05.
         assert_relative_eq!(
             calibration.ece.expect("cases"),
             0.05,

@@ -1,4 +1,5 @@
-//! An independently drawn rig: nominal parameters, their tolerances, and the static force law.
+//! The rig: nominal parameters with tolerances, and the static force law. Each case draws its own
+//! rig.
 
 use crate::effect::Stage;
 use crate::random::RandomGenerator;
@@ -13,9 +14,9 @@ pub(crate) const RHO_0: f64 = 1.185;
 pub(crate) const V_0: f64 = 25e-6;
 /// Resting length, mm.
 pub(crate) const L_0: f64 = 180.0;
-/// Pressure that the force law is scaled by, Pa.
+/// Reference pressure of the force law, Pa.
 pub(crate) const P_REF: f64 = 620e3;
-/// Noise of the amplified voltage, V; length, mm; pressure, Pa (1 sd).
+/// Standard deviations of the noise: amplified voltage, V; length, mm; pressure, Pa.
 pub(crate) const SIGMA_V: f64 = 0.002;
 pub(crate) const SIGMA_L: f64 = 0.05;
 pub(crate) const SIGMA_P: f64 = 1200.0;
@@ -24,7 +25,7 @@ pub(crate) const V_FS: f64 = 3.3;
 pub(crate) const V_STEP: f64 = V_FS / 4095.0;
 /// Step of the length converter, mm.
 pub(crate) const L_STEP: f64 = 50.0 / 4095.0;
-/// The sleeve must stay stretched by this strain over the stroke.
+/// Smallest strain of the sleeve over the stroke.
 pub(crate) const LEAST_STRAIN: f64 = 0.004;
 
 /// One uncertain parameter: name, stage, nominal value, standard deviation.
@@ -39,7 +40,7 @@ const fn relative(name: &'static str, stage: Stage, value: f64, share: f64) -> U
     Uncertain { name, stage, value, sd: value * share }
 }
 
-/// Every parameter that is not exact, in the order of [`Rig::values`].
+/// All parameters that are not exact, in the order of [`Rig::values`].
 pub(crate) const UNCERTAIN: [Uncertain; 16] = [
     relative("P_s", Stage::Pneumatics, 620e3, 0.01),
     relative("C_in", Stage::Pneumatics, 1e-9, 0.3),
@@ -59,15 +60,15 @@ pub(crate) const UNCERTAIN: [Uncertain; 16] = [
     Uncertain { name: "V_ref", stage: Stage::Sensing, value: 1.24, sd: 0.02 },
 ];
 
-/// Values of the uncertain parameters, and the inverse of the force law they imply.
+/// Values of the uncertain parameters, and the inverse of the force law with these values.
 #[derive(Debug, Clone)]
 pub(crate) struct Rig {
-    /// In the order of [`UNCERTAIN`].
+    /// Values in the order of [`UNCERTAIN`].
     pub(crate) values: [f64; UNCERTAIN.len()],
     contraction: Vec<f64>,
 }
 
-/// Knots of the tabled inverse, and the largest pressure ratio in it.
+/// Number of intervals of the table of the inverse, and the largest pressure ratio in the table.
 const KNOTS: usize = 4096;
 const RATIO_MAX: f64 = 1.7;
 
@@ -81,14 +82,15 @@ impl Rig {
     named!(p_s = 0, c_in = 1, c_out = 2, b = 3, u_min = 4, k_max = 5, tau_m = 9);
     named!(e0 = 10, r0 = 11, beta = 12, v_exc = 13, gain = 14, v_ref = 15);
 
-    /// The rig with these values; tables the static contraction.
+    /// Creates the rig with these values, and the table of its static contraction.
     pub(crate) fn new(values: [f64; UNCERTAIN.len()]) -> Self {
         let (a0, a1, a3) = (values[6], values[7], values[8]);
         let mut contraction = Vec::with_capacity(KNOTS + 1);
         let mut x = 0.0_f64;
         for knot in 0..=KNOTS {
             let ratio = RATIO_MAX * knot as f64 / KNOTS as f64;
-            // Newton from the previous knot, because the law is smooth and strictly rising.
+            // Newton's method starts at the previous knot. It converges because the law is smooth
+            // and strictly rising.
             for _ in 0..6 {
                 let (decay, growth) = ((-a1 * x).exp(), (a3 * x * x).exp());
                 let law = a0 * (1.0 - decay) * growth;
@@ -100,14 +102,15 @@ impl Rig {
         Self { values, contraction }
     }
 
-    /// The rig as its data sheet says.
+    /// Returns the rig with the nominal values.
     #[cfg(test)]
     pub(crate) fn nominal() -> Self {
         Self::new(std::array::from_fn(|i| UNCERTAIN[i].value))
     }
 
-    /// A rig from the tolerances: Gaussians cut at 2.5 sd and at 0.2 of the nominal value,
-    /// drawn again until the sleeve stays stretched over the static stroke.
+    /// Draws a rig within the tolerances. The parameters are Gaussian, limited to 2.5 standard
+    /// deviations and to at least 0.2 of the nominal value. The rig is drawn again until the sleeve
+    /// stays stretched over the static stroke.
     pub(crate) fn draw(random: &mut RandomGenerator) -> Self {
         loop {
             let rig = Self::new(std::array::from_fn(|i| {
@@ -126,14 +129,14 @@ impl Rig {
         }
     }
 
-    /// The same rig with parameter `index` moved by `step`.
+    /// Returns the same rig with parameter `index` changed by `step`.
     pub(crate) fn moved(&self, index: usize, step: f64) -> Self {
         let mut values = self.values;
         values[index] += step;
         Self::new(values)
     }
 
-    /// Contraction without load at an absolute pressure in Pa, at rest.
+    /// Returns the contraction at rest, without load, at an absolute pressure in Pa.
     pub(crate) fn static_contraction(&self, p: f64) -> f64 {
         let at = ((p - P_ATM) / P_REF).clamp(0.0, RATIO_MAX) * (KNOTS as f64 / RATIO_MAX);
         let knot = (at as usize).min(KNOTS - 1);
@@ -141,23 +144,24 @@ impl Rig {
         low + (high - low) * (at - knot as f64)
     }
 
-    /// Gauge strain of a sleeve that follows the contraction `k`.
+    /// Returns the gauge strain at the contraction `k`.
     pub(crate) fn strain(&self, k: f64) -> f64 {
         (1.0 + self.e0()) * (1.0 - k) - 1.0
     }
 
-    /// Amplified bridge voltage of a gauge resistance in ohm at an excitation in V.
+    /// Returns the amplified bridge voltage at a gauge resistance in ohm and an excitation in V.
     pub(crate) fn bridge(&self, ohm: f64, excitation: f64) -> f64 {
         let arm = self.beta() * self.r0() * (1.0 + self.e0()).powi(2);
         self.v_ref() + self.gain() * excitation * (0.5 - ohm / (ohm + arm))
     }
 
-    /// Nominal voltage at a contraction: no effect, no noise, no converter.
+    /// Returns the voltage at a contraction, without effects, noise and converter.
     pub(crate) fn volts(&self, k: f64) -> f64 {
         self.bridge(self.r0() * (1.0 + self.strain(k)).powi(2), self.v_exc())
     }
 
-    /// Flow of ISO 6358 through a conductance `c`, kg/s, from `p1` to `p2` (no flow back).
+    /// Returns the flow from `p1` to `p2` through the conductance `c` by ISO 6358, kg/s. It is 0 if
+    /// `p2` is larger.
     pub(crate) fn flow(&self, c: f64, p1: f64, p2: f64) -> f64 {
         let r = p2 / p1;
         let b = self.b();

@@ -1,4 +1,4 @@
-//! The figures of a blind check, from the opened labels and the verdicts.
+//! Computes the statistics of a blind check from the opened labels and the verdicts.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,34 +10,36 @@ use crate::rate::{Calibration, Rate};
 use crate::truth::{CaseKind, Label, Truth, are_twins};
 use crate::verdict::Verdict;
 
-/// Smallest excess from which a single effect counts.
+/// Smallest excess of a single effect that counts in the statistics.
 pub const COUNTED_EXCESS: f64 = 0.1;
 
 /// Answers to single effects with at least [`COUNTED_EXCESS`].
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Singles {
-    /// First name right; a declared tie that holds the truth counts as right.
+    /// The first named effect is right. A declared tie that contains the true effect counts as
+    /// right.
     pub top1: Rate,
-    /// The same for an excess above 10.
+    /// The same, for cases with an excess above 10.
     pub top1_above_10: Rate,
-    /// Exactly the one effect named; a declared tie that holds the truth counts as right.
+    /// Only one effect is named, and it is right. A declared tie that contains the true effect
+    /// counts as right.
     pub exact: Rate,
-    /// Stage right.
+    /// The stage is right.
     pub stage: Rate,
-    /// The effect is in the 95 % set (of cases whose set is not empty).
+    /// The effect is in the 95 % set; cases with an empty set do not count.
     pub set_covers: Rate,
     /// Mean number of effects in the sets that are not empty.
     pub set_size: Option<f64>,
-    /// Called unknown.
+    /// The verdict is `unknown`.
     pub false_unknown: Rate,
 }
 
 /// Answers to two effects.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Compounds {
-    /// Every effect named.
+    /// All effects are named.
     pub all_named: Rate,
-    /// At least one of them named.
+    /// At least one of the effects is named.
     pub one_named: Rate,
 }
 
@@ -48,13 +50,13 @@ pub struct Miss {
     pub case: String,
     /// Its kind.
     pub kind: CaseKind,
-    /// Effects there.
+    /// True effects.
     pub truth: Vec<String>,
-    /// Verdict given.
+    /// Verdict of the diagnosis.
     pub verdict: String,
-    /// Effects named.
+    /// Effects that the diagnosis names.
     pub named: Vec<String>,
-    /// Whether each effect there is in the 95 % set.
+    /// Whether the 95 % set contains all true effects.
     pub in_set: bool,
     /// Excess of the label.
     pub excess: f64,
@@ -62,35 +64,40 @@ pub struct Miss {
     pub pressure_column: bool,
 }
 
-/// Every figure of a blind check.
+/// All statistics of a blind check.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Score {
-    /// Cases scored.
+    /// Number of cases that were scored.
     pub cases: usize,
-    /// Cases with a label and no verdict.
+    /// Cases that have a label but no verdict.
     pub unanswered: Vec<String>,
     /// Single effects.
     pub singles: Singles,
-    /// Nulls on which an effect was named, the gap was called unknown, or the recording wrong.
+    /// Cases without an effect in which an effect was named, or the verdict is `unknown` or
+    /// `record`.
     pub false_alarms: Rate,
-    /// Nulls on which an effect was named.
+    /// Cases without an effect in which an effect was named.
     pub false_names: Rate,
-    /// Probability of the first candidate against truth, over the singles counted.
+    /// Probability of the first candidate compared with the truth, over the single effects that
+    /// count.
     pub calibration: Calibration,
     /// Two effects.
     pub compounds: Compounds,
-    /// One strong effect and three weak ones: the strong one named.
+    /// Cases of one strong and three weak effects in which the strong effect is named.
     pub dominant_named: Rate,
-    /// Effects out of the catalogue answered `unknown`, excess at least [`COUNTED_EXCESS`].
+    /// Effects outside the catalogue, with an excess of at least [`COUNTED_EXCESS`], that were
+    /// answered by `unknown`.
     pub foreign_caught: Rate,
-    /// An effect named for one out of the catalogue.
+    /// Effects outside the catalogue in place of which another effect was named.
     pub foreign_named: Rate,
-    /// Effects without a known twin whose entry was removed from the catalogue, answered `unknown`;
-    /// excess at least [`COUNTED_EXCESS`].
+    /// Effects whose entry was removed from the catalogue and that have no known twin, with an
+    /// excess of at least [`COUNTED_EXCESS`], that were answered by `unknown`.
     pub struck_unknown: Rate,
-    /// Accuracy of the first name by effect, singles counted.
+    /// Rate at which the first named effect is right, by effect, over the single effects that
+    /// count.
     pub by_effect: BTreeMap<String, Rate>,
-    /// Exactly the one effect named, by family of its form, singles counted.
+    /// Rate at which exactly the right effect is named, by family of its form, over the single
+    /// effects that count.
     pub by_family: BTreeMap<Family, Rate>,
     /// Every wrong answer.
     pub misses: Vec<Miss>,
@@ -123,7 +130,7 @@ impl Score {
     }
 }
 
-/// A score in the making.
+/// A score that is being computed.
 #[derive(Debug, Default)]
 struct Tally {
     score: Score,
@@ -162,7 +169,7 @@ impl Tally {
         let answer = verdict.answer();
         let top1 = answer.first() == Some(effect) || verdict.ties().contains(effect);
         if label.excess < COUNTED_EXCESS {
-            // A faint effect may be overlooked; a wrong name is a miss.
+            // If a faint effect is not named, this is no error; if another effect is named, it is.
             return answer.is_empty() || top1;
         }
         let singles = &mut self.score.singles;
@@ -220,7 +227,8 @@ impl Tally {
         unknown || by_twin
     }
 
-    /// A wrong name is excused if a true effect that was not named is in the declared tie.
+    /// Scores a case with several effects. A wrong name does not count as an error if the declared
+    /// tie contains a true effect that was not named.
     fn several(&mut self, label: &Label, verdict: &Verdict) -> bool {
         let answer = verdict.answer();
         let named = label.effects.iter().filter(|e| answer.contains(e)).count();
@@ -271,8 +279,8 @@ fn in_stage(label: &Label, verdict: &Verdict) -> bool {
     }
 }
 
-/// Quantile by the nearest rank of the finite values (the mean of the middle two for an even
-/// median); `None` without one.
+/// Returns a quantile of the finite values by the nearest rank. The median of an even number of
+/// values is the mean of the middle two. `None` if there is no finite value.
 pub(crate) fn quantile(values: &mut Vec<f64>, q: f64) -> Option<f64> {
     values.retain(|v| v.is_finite());
     values.sort_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! Labels sealed by their hash: written before the diagnosis, opened after it.
+//! Seals labels by their hash before a diagnosis, and opens them after it.
 
 use std::{fs, path::Path};
 
@@ -7,9 +7,9 @@ use sha2::{Digest, Sha256};
 
 use crate::{error::BlindError, make::write, truth::Truth};
 
-/// The hash of the labels.
+/// File with the hash of the labels.
 pub(crate) const MARK: &str = "seal.sha256";
-/// Where the labels of a check lie in its folder.
+/// File of the labels in the folder of a check.
 const LABELS: &str = "sealed/truth.json";
 
 impl Truth {
@@ -22,7 +22,7 @@ impl Truth {
         close(dir, &dir.join(LABELS), LABELS, self)
     }
 
-    /// Opens the labels under `dir`, if their hash has not changed; also returns the hash.
+    /// Opens the labels under `dir` if their hash has not changed. Also returns the hash.
     ///
     /// # Errors
     /// [`BlindError::SealBroken`] if it has; [`BlindError::Io`], [`BlindError::Json`] if a file is
@@ -32,8 +32,8 @@ impl Truth {
     }
 }
 
-/// Writes labels to a file, and its SHA-256 under its name to `seal.sha256` of the folder `set`, in the layout of
-/// `sha256sum -c`; returns the SHA-256.
+/// Writes labels to a file. Writes name and SHA-256 of this file to `seal.sha256` in the folder `set`, in the
+/// format of `sha256sum -c`. Returns the SHA-256.
 pub(crate) fn close(
     set: &Path,
     path: &Path,
@@ -47,7 +47,8 @@ pub(crate) fn close(
     Ok(sha256)
 }
 
-/// Labels, if their SHA-256 equals the one in `seal.sha256` of the folder `set`; also returns the hash.
+/// Reads labels if their SHA-256 equals the one in `seal.sha256` in the folder `set`. Also returns the
+/// hash.
 pub(crate) fn open<T: DeserializeOwned>(
     path: &Path,
     set: &Path,

@@ -1,4 +1,5 @@
-//! One session on a rig: every trial after the other, memories carried through the pauses.
+//! Simulates a session on a rig: the trials one after the other. States with memory continue
+//! through the pauses.
 
 use crate::curve::hermite;
 use crate::disturbances::Surroundings;
@@ -10,29 +11,31 @@ use crate::random::RandomGenerator;
 use crate::rig::{P_ATM, Rig};
 use crate::timing::{Skew, mains};
 
-/// Steps of a sample while a session is recorded: 0.5 ms each.
+/// Integration steps per sample while a session is recorded: 0.5 ms each.
 pub(crate) const FINE: usize = 20;
-/// Steps of a sample where two sessions are compared: 2 ms each.
+/// Integration steps per sample if two sessions are compared: 2 ms each.
 pub(crate) const COARSE: usize = 5;
-/// Steps of a sample in the pauses: 2 ms each.
+/// Integration steps per sample in the pauses: 2 ms each.
 const PAUSE: usize = 5;
 /// Length of the preparation before the first trial, s.
 const PREPARE_S: f64 = 2.0 * PAUSE_S;
-/// Knots of the supply fluctuation, s.
+/// Distance between the knots of the supply fluctuation, s.
 const KNOT_S: f64 = 0.1;
 
-/// What no parameter describes: supply fluctuation and start pressures.
+/// Conditions of a session that no parameter describes: supply fluctuation, start pressures and
+/// sampling times.
 #[derive(Debug, Clone)]
 pub(crate) struct Conditions {
     supply: Vec<f64>,
-    /// Of each trial: Pa above the atmosphere, or the share of the supply that it lacks.
+    /// Error of the start pressure of each trial: Pa above the atmosphere, or the missing share of
+    /// the supply if the trial starts filled.
     start_error: Vec<f64>,
     /// Delay of each sample of a trial relative to the grid, s; empty if all are on the grid.
     offsets: Vec<Vec<f64>>,
 }
 
 impl Conditions {
-    /// As the surroundings have it.
+    /// Draws the conditions from the disturbances of a case.
     pub(crate) fn draw(
         scripts: &[Script],
         around: &Surroundings,
@@ -47,7 +50,7 @@ impl Conditions {
         Self { supply, start_error, offsets }
     }
 
-    /// Delay of the samples of a trial relative to the grid, s.
+    /// Returns the delay of the samples of a trial relative to the grid, s.
     pub(crate) fn offsets(&self, trial: usize) -> &[f64] {
         &self.offsets[trial]
     }
@@ -60,14 +63,14 @@ impl Conditions {
     }
 }
 
-/// Knots that the supply needs over a session.
+/// Returns the number of knots of the supply fluctuation over a session.
 fn knots(scripts: &[Script]) -> usize {
     let duration: f64 =
         scripts.iter().map(|s| s.openings.len() as f64 / RATE_HZ as f64 + s.pause_s).sum();
     ((duration + PREPARE_S) / KNOT_S) as usize + 3
 }
 
-/// Interpolates values from the grid to the times of the samples.
+/// Interpolates values on the grid to the times of the samples.
 fn resampled(values: Vec<f64>, offsets: &[f64]) -> Vec<f64> {
     if offsets.is_empty() {
         return values;
@@ -82,12 +85,12 @@ fn resampled(values: Vec<f64>, offsets: &[f64]) -> Vec<f64> {
     offsets.iter().enumerate().map(value).collect()
 }
 
-/// Channels of a trial before noise and rounding, 100 samples a second.
+/// Channels of a trial before noise and rounding, with 100 samples per second.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Trace {
     /// Gauge pressure, Pa.
     pub(crate) pressure: Vec<f64>,
-    /// Shown length, mm.
+    /// Length that the potentiometer shows, mm.
     pub(crate) length: Vec<f64>,
     /// Length, mm, of a muscle without effects at the same pressure.
     pub(crate) shadow: Vec<f64>,
@@ -97,7 +100,7 @@ pub(crate) struct Trace {
     pub(crate) least_strain: f64,
 }
 
-/// Runs every script in turn; `fine` steps a sample.
+/// Simulates all trials in order, with `fine` integration steps per sample.
 pub(crate) fn run(
     rig: &Rig,
     causes: &Causes,
@@ -139,7 +142,7 @@ pub(crate) fn run(
     traces
 }
 
-/// Everything that carries a memory, and the supply.
+/// The parts with internal states, and the supply.
 struct Bench<'a, S: Fn(f64) -> f64> {
     plant: Plant<'a>,
     gauge: Gauge<'a>,
@@ -150,15 +153,15 @@ struct Bench<'a, S: Fn(f64) -> f64> {
 }
 
 impl<S: Fn(f64) -> f64> Bench<'_, S> {
-    /// Fills or vents for half a pause (when it begins, how long it is), then holds the pressure that
-    /// the next trial starts from.
+    /// Simulates a pause, given by its start and its duration: fills or vents for half of it, then
+    /// holds the pressure at which the next trial starts.
     fn pause(&mut self, fill: bool, target: f64, (begin, pause_s): (f64, f64)) {
         let h = 1.0 / (RATE_HZ * PAUSE) as f64;
         let steps = (pause_s / h).round() as usize;
         let open = if fill { (1.0, 0.0) } else { (0.0, 1.0) };
         for i in 0..steps {
             let t = i as f64 * h;
-            // Valves shut at the end in time for the slowest of them.
+            // The valves shut at half of the pause, early enough for the slowest valve.
             let command =
                 |time: f64| if (0.0..0.5 * pause_s).contains(&time) { open } else { (0.0, 0.0) };
             self.plant.step(&command, t, h, (self.supply)(begin + t));
@@ -214,7 +217,8 @@ impl<S: Fn(f64) -> f64> Bench<'_, S> {
         trace
     }
 
-    /// Voltages of a recorded path: the skew needs to look ahead, so the path comes first.
+    /// Computes the voltages of a simulated path. The path is simulated first, because a skew may
+    /// read later values.
     fn volts(
         &mut self,
         (trial, offsets): (usize, &[f64]),
@@ -269,7 +273,7 @@ mod tests {
 
     fn short_session() -> Vec<Script> {
         let mut scripts = session(&mut RandomGenerator::new(8, 1));
-        // One fast inflation, one fast deflation, 20 s of pulses.
+        // A session of one fast inflation, one fast deflation, and 20 s of pulses.
         scripts = vec![scripts[5].clone(), scripts[11].clone(), scripts[13].clone()];
         scripts[2].openings.truncate(2000);
         for (i, script) in scripts.iter_mut().enumerate() {
@@ -278,7 +282,7 @@ mod tests {
         scripts
     }
 
-    /// A steady supply, and starts at its pressure or that of the atmosphere.
+    /// A constant supply; trials start at its pressure or at that of the atmosphere.
     fn quiet() -> Conditions {
         let offsets = vec![Vec::new(); 3];
         Conditions { supply: vec![0.0; 4000], start_error: vec![0.0; 3], offsets }
@@ -320,8 +324,8 @@ mod tests {
         }
     }
 
-    /// Sum of squares, over all channels, of the difference between two sessions, in units of the
-    /// noise.
+    /// Returns the sum of squared differences between two sessions over all channels, in multiples
+    /// of the noise.
     fn apart(a: &[Trace], b: &[Trace]) -> f64 {
         type Channel = fn(&Trace) -> &Vec<f64>;
         let channels: [(Channel, f64); 3] =
@@ -336,11 +340,11 @@ mod tests {
     #[test]
     fn drawn_forms_vanish_with_their_strength_grow_with_it_and_differ_by_family() {
         let mut scripts = short_session();
-        // Dead bands differ where the valve is hardly open.
+        // Dead bands differ at small openings.
         scripts[0].openings.iter_mut().for_each(|u| u.0 *= 0.08);
         let mut random = RandomGenerator::new(8, 6);
         let rig = Rig::nominal();
-        // Knees count from the strain and the voltage at the nominal supply.
+        // The positions of knees are relative to the strain and the voltage at the nominal supply.
         let conditions = quiet();
         let session =
             |causes: &[Cause]| run(&rig, &Causes::new(causes), &scripts, &conditions, COARSE);
@@ -349,11 +353,11 @@ mod tests {
             let seed = random.bits();
             let mut strongest: Vec<Vec<Trace>> = Vec::new();
             for family in Family::ALL {
-                // One cause but for where its form comes from.
+                // The causes are equal except for the family of the form.
                 let cause = Cause::draw(kind, family, &mut RandomGenerator::new(seed, 0));
                 let name = format!("{} {family}", kind.spec().name);
                 let at = |share: f64| session(&[cause.at(share * cause.most())]);
-                // A muscle on a spring of 2 ms has inertia still, and none is not simulated.
+                // The inertia is left out, because its smallest strength still has an effect.
                 if kind != Kind::CrossbeamInertia {
                     let none = apart(&nominal, &session(&[cause.at(1e-3 * kind.spec().least)]));
                     assert!(none < 1e-2, "{name}: {none}");
@@ -363,7 +367,7 @@ mod tests {
                 let grown = apart(&nominal, &strong);
                 assert!(grown > weak && weak > 0.0, "{name}: {weak} then {grown}");
                 for other in &strongest {
-                    // Narrow knees differ in a few samples only.
+                    // The limit is low, because narrow knees differ in few samples.
                     assert!(apart(&strong, other) > 1e-2, "{name} is as another family");
                 }
                 strongest.push(strong);
@@ -394,13 +398,13 @@ mod tests {
         let end = inflation.length.len() - 1;
         assert_eq!(inflation.pressure[0], 0.0);
         assert_abs_diff_eq!(inflation.pressure[end], 620e3, epsilon = BLIND_FULL_PA);
-        // Contraction 1.0176 x 0.162 of 180 mm.
+        // The contraction is 1.0176 x 0.162, and the resting length 180 mm.
         let length_mm = 180.0 * (1.0 - 1.0176 * 0.162);
         assert_abs_diff_eq!(inflation.length[end], length_mm, epsilon = BLIND_LENGTH_MM);
-        // Choked filling: R T / V0 times C rho0 p1, 28.8 kPa in 10 ms.
+        // Choked flow: the pressure rises at R T / V0 times C rho0 p1, 28.8 kPa in 10 ms.
         let expected = 84_148.7 / 25e-6 * 1e-9 * 1.185 * 721_325.0 * 0.01;
         assert_abs_diff_eq!(inflation.pressure[101], expected, epsilon = BLIND_FILL_PA);
-        // Trimmed: no bridge voltage at rest.
+        // The bridge is trimmed, so its voltage is zero at rest.
         assert_abs_diff_eq!(inflation.volts[0], 1.24, epsilon = BLIND_TRIMMED_V);
         assert!(traces[1].pressure[0] > 619e3 && traces[1].pressure[end] < 1.0);
         assert!(traces.iter().all(|t| t.least_strain > crate::rig::LEAST_STRAIN));
@@ -416,7 +420,8 @@ mod tests {
         cause.form = 0;
         let causes = Causes::new(&[cause.at(0.01)]);
         let traces = run(&rig, &causes, &scripts, &conditions, COARSE);
-        // Vented before the first trial: the slack of 0.01 strain is on the side of relaxing.
+        // The muscle was vented before the first trial, so the sleeve has slipped by 0.01 strain in
+        // the direction of relaxing.
         let offset = traces[0].volts[0] - rig.volts(0.0);
         let slope = (rig.volts(0.01) - rig.volts(0.0)) / 0.01 / (1.0 + rig.e0());
         assert_abs_diff_eq!(

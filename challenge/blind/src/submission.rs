@@ -1,5 +1,5 @@
-//! A submission: the answers of a method to every case of a set, checked before it is scored; what came of each case,
-//! and the figures of the method, each with an interval by bootstrap.
+//! A submission holds the answers of a method to all cases of a set. This module checks a submission, scores each
+//! case, and computes the statistics of the method with bootstrap intervals.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,27 +15,27 @@ use crate::{
 };
 
 worded! {
-    /// What an answer says in one word.
+    /// The verdict of an answer.
     Said {
         /// The simulator agrees as it is.
         Nothing "none",
-        /// It agrees once its parameters are re-tuned.
+        /// The simulator agrees after its parameters are re-tuned.
         Parameters "parameters",
-        /// The most probable effects are missing.
+        /// Effects are missing, and are named.
         Effect "effect",
         /// The cause is not among the candidates.
         Unknown "unknown",
     }
 }
 
-/// Effects that together are all that is missing, and the probability of that: an empty list for
-/// nothing, `unknown` for a cause that is no candidate.
+/// A hypothesis (the set of all missing effects) and its probability. The set is empty if nothing
+/// is missing, and `unknown` if the cause is not among the candidates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Believed {
-    /// Names, in any order.
+    /// Names of the effects, in any order.
     pub effects: Vec<String>,
-    /// Between 0 and 1; those of a case sum to 1.
+    /// Probability from 0 to 1; the probabilities of a case sum to 1.
     pub probability: f64,
 }
 
@@ -43,29 +43,30 @@ pub struct Believed {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Answer {
-    /// What may be missing.
+    /// Hypotheses with their probabilities.
     pub probabilities: Vec<Believed>,
-    /// What is said.
+    /// Verdict.
     pub verdict: Said,
-    /// Effects that an `effect` names; if they are missing, the most probable ones.
+    /// Effects that the verdict `effect` names; by default those of the most probable hypothesis
+    /// with effects.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub named: Option<Vec<String>>,
-    /// Names that the data cannot tell from the one named.
+    /// Effects that the data cannot distinguish from the named one.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tied: Vec<String>,
-    /// Stage of the gap; absent where there is none.
+    /// Stage of the gap; absent if there is no gap.
     #[serde(default)]
     pub place: Option<String>,
-    /// Share of the gap of the test trials that the named effects close.
+    /// Share of the gap on the test trials that the named effects close.
     #[serde(default)]
     pub closed_share: f64,
-    /// Time it took, s.
+    /// Computing time, s.
     pub seconds: f64,
-    /// Runs of the simulator that it took.
+    /// Number of simulator runs.
     pub simulations: u64,
 }
 
-/// What a method says of a set.
+/// The answers of a method to a set.
 ///
 /// The layout is `submission.schema.json` of the challenge.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -75,7 +76,7 @@ pub struct Submission {
     pub schema: u32,
     /// Name of the method.
     pub method: String,
-    /// Who set it up, what was tuned, on which cases.
+    /// Who set up the method, what was tuned, and on which cases.
     #[serde(default)]
     pub setup: String,
     /// SHA-256 of the labels, from `set.toml`.
@@ -95,7 +96,7 @@ macro_rules! ensure {
 
 /// Largest deviation from 1 of the sum of a case's probabilities.
 const SUM_TOLERANCE: f64 = 1e-6;
-/// Name of a cause that is no candidate.
+/// Name of a cause that is not among the candidates.
 const UNKNOWN: &str = "unknown";
 
 impl Submission {
@@ -167,51 +168,54 @@ impl Answer {
     }
 }
 
-/// Smallest probability in the logarithmic score: a true cause that was held impossible costs ln
-/// 1000.
+/// Smallest probability in the logarithmic score. If the true cause had the probability 0, it costs
+/// ln 1000.
 const LEAST_PROBABILITY: f64 = 1e-3;
-/// Probability that a covering set reaches.
+/// Probability of the smallest set of hypotheses that counts as covering.
 const COVERED: f64 = 0.95;
-/// Draws of the bootstrap.
+/// Number of draws of the bootstrap.
 const DRAWS: usize = 1000;
 /// Seed of the bootstrap.
 const SEED: u64 = 31;
 
-/// What came of one case.
+/// Result of one case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
     /// Name of the case.
     pub case: String,
     /// How hard it is.
     pub level: Level,
-    /// What the answer said in one word.
+    /// Verdict of the answer.
     pub verdict: Said,
-    /// Names that it committed to.
+    /// Effects that the answer names.
     pub named: Vec<String>,
-    /// What was true; `unknown` for a cause that is no candidate.
+    /// True effects; `unknown` if the cause is not among the candidates.
     pub truth: Vec<String>,
-    /// Whether exactly that was named: nothing if nothing was missing, `unknown` if the cause is no
-    /// candidate.
+    /// Whether exactly the true effects were named: none if nothing is missing, `unknown` if the
+    /// cause is not among the candidates.
     pub is_exact: bool,
-    /// Whether it is exact, or a declared tie of two holds the one active effect.
+    /// Whether the answer is exact, or declares a tie of two effects that contains the only true
+    /// one.
     pub is_exact_or_tied: bool,
-    /// Greatest probability given.
+    /// Probability of the most probable hypothesis.
     pub confidence: f64,
-    /// Whether what had it is the truth.
+    /// Whether the most probable hypothesis is true.
     pub is_first_right: bool,
-    /// Probability of the truth.
+    /// Probability that the answer gives to the true hypothesis.
     pub probability_of_truth: f64,
-    /// Whether the most probable answers that make up 95 % hold the truth.
+    /// Whether the true hypothesis is among the most probable ones that together have 95 %
+    /// probability.
     pub is_covered: bool,
-    /// How many answers these are.
+    /// Number of these hypotheses.
     pub set_size: usize,
-    /// Whether the stage is right; absent where there is none.
+    /// Whether the stage is right; absent if there is no true stage.
     pub is_place_right: Option<bool>,
-    /// Closed share over that of the oracle; absent where no candidate is at work.
+    /// Closed share of the gap divided by that of the oracle (the true effects); absent if no
+    /// candidate is active.
     pub closed_of_oracle: Option<f64>,
-    /// Time, s.
+    /// Computing time in s.
     pub seconds: f64,
-    /// Runs of the simulator.
+    /// Number of runs of the simulator.
     pub simulations: u64,
 }
 
@@ -222,11 +226,11 @@ pub struct OpenScore {
     pub schema: u32,
     /// Name of the method.
     pub method: String,
-    /// How it was set up.
+    /// Setup of the method.
     pub setup: String,
     /// Plant.
     pub plant: String,
-    /// Seed, open from now on.
+    /// Seed of the set. It is public from now on.
     pub seed: u64,
     /// SHA-256 of the labels.
     pub set: String,
@@ -235,7 +239,7 @@ pub struct OpenScore {
 }
 
 impl OpenScore {
-    /// Scores a submission, checked.
+    /// Checks and scores a submission.
     ///
     /// # Errors
     /// As [`Submission::check`].
@@ -271,10 +275,10 @@ impl Outcome {
         };
         let mut believed: Vec<(Vec<String>, f64)> =
             answer.probabilities.iter().map(|b| (sorted(&b.effects), b.probability)).collect();
-        // of equals the one that is listed first
+        // the sort is stable: of equal probabilities, the hypothesis listed first stays first
         believed.sort_by(|a, b| b.1.total_cmp(&a.1));
         let (first, confidence) = believed.first().cloned().unwrap_or_default();
-        // the most probable effect among the answers
+        // whether a hypothesis names effects of the candidates
         let effects = |e: &&(Vec<String>, f64)| !e.0.is_empty() && e.0 != [UNKNOWN];
         let named = match answer.verdict {
             Said::Effect if answer.named.is_some() => {
@@ -325,30 +329,30 @@ impl Outcome {
     }
 }
 
-/// A figure, its 95 % interval under resampling of cases, and the number of cases.
+/// A statistic with its 95 % interval by resampling of the cases, and the number of cases.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Interval {
-    /// The figure; absent where no case counts.
+    /// The statistic; absent if no case counts.
     pub value: Option<f64>,
-    /// Its 2.5 % quantile.
+    /// Lower end of the interval, the 2.5 % quantile.
     pub low: f64,
-    /// Its 97.5 % quantile.
+    /// Upper end of the interval, the 97.5 % quantile.
     pub high: f64,
-    /// Cases.
+    /// Number of cases.
     pub count: usize,
 }
 
-/// The figures of a method.
+/// The statistics of a method.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Figures {
-    /// Each figure with its name, in the order of tables.
+    /// Each statistic with its name, in the order of the tables.
     pub rows: Vec<(String, Interval)>,
-    /// Greatest probability of an answer against how often it was right.
+    /// Calibration of the probability of the most probable hypothesis.
     pub reliability: Calibration,
 }
 
 impl Figures {
-    /// Figures of outcomes, of one plant or of several together.
+    /// Computes the statistics of outcomes, of one plant or of several together.
     #[must_use]
     pub fn of(all: &[Outcome]) -> Self {
         let some = |keep: &dyn Fn(&Outcome) -> bool| -> Vec<&Outcome> {
@@ -402,7 +406,8 @@ fn reliability(cases: &[&Outcome]) -> Calibration {
     Calibration::of(cases.iter().map(|o| (o.confidence, o.is_first_right)))
 }
 
-/// A figure of cases and its interval over sets of as many cases drawn from them.
+/// Computes a statistic of cases, with its interval over resampled sets of the same number of
+/// cases.
 fn drawn(cases: &[&Outcome], figure: impl Fn(&[&Outcome]) -> f64) -> Interval {
     if cases.is_empty() {
         return Interval::default();

@@ -1,4 +1,4 @@
-//! Clocks and mains: a drifting skew, and hum.
+//! Timing errors and mains hum: a skew that drifts, and hum.
 
 use crate::curve::{Wiggle, weights};
 use crate::effect::Cause;
@@ -8,11 +8,11 @@ use crate::random::RandomGenerator;
 /// Longest session for which a drifting skew is tabulated, s; it is constant afterwards.
 const LONGEST_S: f64 = 1000.0;
 
-/// How late the voltage is recorded, s: a mean, and how far it drifts from it.
+/// Delay of the recorded voltage, s: a mean and a drift around it.
 #[derive(Debug, Clone)]
 pub(crate) struct Skew {
     law: Law,
-    /// Offset of this trial.
+    /// Additional delay in this trial, s.
     trial: f64,
     cause: Cause,
 }
@@ -21,21 +21,22 @@ pub(crate) struct Skew {
 enum Law {
     /// A smooth random path over the session.
     Path(Wiggle),
-    /// Sines: size, angular frequency in 1/s, phase.
+    /// A sum of sines: amplitude, angular frequency in 1/s, phase.
     Waves(Vec<(f64, f64, f64)>),
-    /// A clock that runs fast or slow, noticed since the trial began.
+    /// A clock that runs too fast or too slow; the delay grows from the start of each trial.
     Rate(f64),
-    /// Another start in every trial.
+    /// A random delay in each trial.
     Starts(f64),
 }
 
 impl Skew {
-    /// The skew of a cause.
+    /// Returns the skew of a cause.
     pub(crate) fn draw(cause: Cause) -> Self {
         let mut random = cause.random(1);
         let size = cause.strength * random.between(0.04, 0.12);
         let law = match cause.family {
-            // A clock that runs 0..80 ppm fast or slow, or one that swings.
+            // A clock that is up to 80 ppm too fast or too slow, or (below) a clock whose error
+            // oscillates.
             Family::Written if cause.form == 0 => {
                 let most = (cause.strength / 0.02).min(1.0);
                 Law::Rate(most * 8e-5 * (2.0 * cause.aux[0] - 1.0))
@@ -61,7 +62,7 @@ impl Skew {
         Self { law, trial: 0.0, cause }
     }
 
-    /// A trial begins.
+    /// Begins a trial.
     pub(crate) fn begin(&mut self, trial: usize) {
         if let Law::Starts(size) = self.law {
             self.trial = size
@@ -69,7 +70,7 @@ impl Skew {
         }
     }
 
-    /// Skew at `t` s of the trial, `session` s of the session.
+    /// Returns the delay at `t` s of the trial and `session` s of the session.
     pub(crate) fn at(&self, t: f64, session: f64) -> f64 {
         let wander = match &self.law {
             Law::Path(path) => path.at(session / LONGEST_S),
@@ -83,8 +84,8 @@ impl Skew {
     }
 }
 
-/// Mains on the samples of a trial, V; `offsets` are how much later than on the grid each was
-/// taken (none: on the grid).
+/// Returns the mains hum at the samples of a trial, V. `offsets` are the delays of the samples
+/// relative to the grid, s; empty if the samples are on the grid.
 pub(crate) fn mains(cause: Cause, trial: usize, samples: usize, offsets: &[f64]) -> Vec<f64> {
     let mut shape = cause.random(1);
     let mut random = RandomGenerator::new(cause.seed, trial as u64);
@@ -94,7 +95,7 @@ pub(crate) fn mains(cause: Cause, trial: usize, samples: usize, offsets: &[f64])
         true => (shape.log_between(0.01, 0.08), shape.log_between(3.0, 60.0)),
         false => (0.03, 20.0),
     };
-    // Numbers and shares of the harmonics.
+    // Orders and relative amplitudes of the harmonics.
     let harmonics: Vec<(f64, f64)> = match cause.family {
         Family::Written => vec![(3.0, 0.08)],
         Family::Splines => Vec::new(),

@@ -7,11 +7,11 @@ use serde::{Deserialize, Serialize};
 use crate::effect::{Family, Stage, worded};
 
 worded! {
-    /// What kind of case it is.
+    /// Kind of the case.
     CaseKind {
         /// One effect of the catalogue.
         Single "single",
-        /// No effect: what differs lies within the tolerances.
+        /// No effect: only the parameters differ, within their tolerances.
         Null "null",
         /// Two effects, each visible on its own.
         Compound "compound",
@@ -24,57 +24,57 @@ worded! {
     }
 }
 
-/// One effect of a case as it was simulated.
+/// An effect of a case, as it was simulated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Acting {
-    /// Name, from the catalogue or not.
+    /// Name, which need not be in the catalogue.
     pub name: String,
-    /// Stage it acts in.
+    /// Stage in which it acts.
     pub stage: Stage,
-    /// Functional form it took.
+    /// Name of the functional form.
     pub form: String,
-    /// Leading parameter in the unit of the catalogue, with its sign; a threshold counts from
-    /// where it begins to act.
+    /// Main parameter with its sign, in the unit of the catalogue. The strength of a threshold is
+    /// its distance from the value at which it begins to act.
     pub strength: f64,
-    /// Excess that it would cause alone.
+    /// Excess that the effect would cause alone.
     pub excess: f64,
 }
 
 /// Label of one case.
 ///
-/// `kind`, `effects`, `stages`, `pressure_column` and `excess` suffice; the other fields are
-/// details.
+/// A label needs only `kind`, `effects`, `stages`, `pressure_column` and `excess`; the other fields
+/// are details.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Label {
-    /// What kind of case it is.
+    /// Kind of the case.
     pub kind: CaseKind,
-    /// Effects at work, the strongest first.
+    /// Active effects, the strongest first.
     pub effects: Vec<String>,
-    /// Stage of each of them.
+    /// Stage of each effect.
     pub stages: Vec<Stage>,
     /// Whether the pressure was recorded.
     pub pressure_column: bool,
-    /// Reduced chi-square minus one of the re-tuned nominal rig, summed over channels on the test
-    /// trials: a mean square in units of the variance of the noise; linear, accurate to a factor of
-    /// two.
+    /// Reduced chi-square minus one of the re-tuned nominal rig on the test trials, summed over
+    /// channels. It is computed from a linear re-tuning, and is accurate to a factor of two.
     pub excess: f64,
-    /// Entry that the diagnosis may not use.
+    /// Entry of the catalogue that the diagnosis may not use.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub struck: Option<String>,
-    /// The strong one of a dominant case.
+    /// The strong effect of a dominant case.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub dominant: Option<String>,
-    /// Family of its forms (drawn for a null); absent if they were written by hand.
+    /// Family of the forms; absent if they were written by hand. A case without an effect has a
+    /// random family.
     #[serde(default, skip_serializing_if = "is_written")]
     pub family: Family,
     /// How each effect was simulated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub acting: Vec<Acting>,
-    /// Nominal parameters of this rig, SI (V and mm as in rig files).
+    /// Nominal parameters of this rig in SI units, except V and mm as in rig files.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub parameters: BTreeMap<String, f64>,
-    /// Disturbances of the rig: levels, times in s, shares. Labels write
-    /// `clutter`, as in the labels whose hashes are published.
+    /// Disturbances of the rig: levels, times in s, and shares. The key in the labels is `clutter`,
+    /// because published hashes depend on it.
     #[serde(rename = "clutter", alias = "disturbances")]
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub disturbances: BTreeMap<String, f64>,
@@ -84,20 +84,20 @@ fn is_written(family: &Family) -> bool {
     *family == Family::Written
 }
 
-/// The labels of all cases, by name of the case.
+/// The labels of all cases.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Truth {
     /// Version of this schema: 1.
     pub schema: u32,
-    /// Seed the cases were made from, where known.
+    /// Seed of the cases, if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seed: Option<u64>,
-    /// Label of every case.
+    /// Label of each case, by its name.
     pub cases: BTreeMap<String, Label>,
 }
 
-/// Pairs of effects that motion alone cannot always distinguish; the last one only without a
-/// pressure column.
+/// Pairs of effects that recordings of motion cannot always distinguish. The last pair counts only
+/// without a pressure column.
 pub const TWINS: [(&str, &str); 7] = [
     ("sleeve_slack", "amplifier_saturation"),
     ("pot_nonlinearity", "gauge_nonlinearity"),

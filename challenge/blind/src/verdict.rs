@@ -6,9 +6,9 @@ use serde_json::Value;
 use crate::effect::Kind;
 use crate::error::BlindError;
 
-/// Verdicts of the schema.
+/// All verdicts of the schema.
 const VERDICTS: [&str; 6] = ["no_gap", "parameters", "record", "effect", "partial", "unknown"];
-/// Verdicts that commit to the effects named.
+/// Verdicts whose answer is the named effects.
 const COMMITS: [&str; 2] = ["effect", "partial"];
 
 /// A diagnosis of one case.
@@ -18,19 +18,19 @@ pub struct Verdict {
     pub case: String,
     /// `no_gap`, `parameters`, `record`, `effect`, `partial` or `unknown`.
     pub verdict: String,
-    /// Effects named, the most important first.
+    /// Named effects, the most important first.
     pub named: Vec<String>,
     /// Effects in the 95 % set.
     pub ambiguous: Vec<String>,
-    /// Names in a declared tie with the named ones: the data cannot distinguish them.
+    /// Effects in a declared tie with the named ones, because the data cannot distinguish them.
     #[serde(default)]
     pub tied: Vec<String>,
     /// Candidates with their probabilities, the best first. A candidate whose only effect is
     /// `unknown` represents causes outside the catalogue.
     pub candidates: Vec<(Vec<String>, f64)>,
-    /// Stage that the gap was placed in.
+    /// Stage to which the gap was assigned.
     pub stage: Option<String>,
-    /// Seconds the diagnosis took.
+    /// Computing time of the diagnosis, s.
     pub runtime_s: f64,
 }
 
@@ -105,20 +105,22 @@ impl Verdict {
         })
     }
 
-    /// The effects it commits to: those named, and only if the verdict is `effect` or `partial`.
+    /// Returns the effects of the answer: the named effects if the verdict is `effect` or
+    /// `partial`, otherwise none.
     #[must_use]
     pub fn answer(&self) -> &[String] {
         if COMMITS.contains(&self.verdict.as_str()) { &self.named } else { &[] }
     }
 
-    /// The names in a declared tie with those it commits to.
+    /// Returns the effects in a declared tie with those of the answer.
     pub(crate) fn ties(&self) -> &[String] {
         if self.answer().is_empty() { &[] } else { &self.tied }
     }
 
-    /// Its most likely answer, the names tied with it, and their joint probability.
+    /// Returns the effects of the most probable candidate and those tied with them, and their joint
+    /// probability.
     pub(crate) fn belief(&self) -> Option<(Vec<&String>, f64)> {
-        // Of equals the one that is listed first.
+        // Of equally probable candidates, take the one that is listed first.
         let candidates = self.candidates.iter().rev();
         let (first, probability) = candidates.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let mut names: Vec<&String> = first.iter().take(1).collect();

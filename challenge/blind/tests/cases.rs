@@ -1,4 +1,5 @@
-//! Cases on the disk: same bits for the same seed, sealed, and with the documented layout.
+//! Tests of cases on the disk: a seed always gives the same bytes, the labels are sealed, and the
+//! layout is the documented one.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -39,7 +40,7 @@ fn same_seed_same_bits_whatever_the_number_of_threads() {
     let first = files(dirs[0].path());
     assert_eq!(first, files(dirs[1].path()));
 
-    // Labels are only in the sealed folder; a folder that has one is not overwritten.
+    // Labels are only in the sealed folder. A folder that contains labels is not overwritten.
     let (truth, sha256) = Truth::open(dirs[0].path()).expect("an unbroken seal");
     assert_eq!((sha256.len(), truth.cases.len()), (64, 4));
     let again = make(dirs[0].path(), 42, &small(), &|_| {});
@@ -53,7 +54,7 @@ fn same_seed_same_bits_whatever_the_number_of_threads() {
         let mut lines = csv.lines();
         let header = lines.next().expect("a header");
         assert_eq!(header.contains("pressure_kpa"), label.pressure_column);
-        // Up to one row in a hundred may be missing, and by chance some more.
+        // On average up to one row in a hundred is missing; by chance it may be more.
         assert!((5800..=6000).contains(&lines.clone().count()));
         let columns = header.split(',').count();
         assert!(lines.all(|line| line.split(',').count() == columns));
@@ -81,7 +82,7 @@ fn a_case_says_its_family_and_its_disturbances() {
     let label = &truth.cases["case-000"];
     assert_eq!((label.family, label.acting[0].form.as_str()), (Family::Spectra, "spectra"));
     assert!(label.disturbances.len() > 20);
-    // The rig file says the noise that is there.
+    // The rig file states the true noise.
     let found = files(&dir.path().join("case-000"));
     assert_eq!(
         found.contains_key("rig.toml"),

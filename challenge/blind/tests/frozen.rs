@@ -1,4 +1,5 @@
-//! Cases keep their bits: what was published can be made again.
+//! The bytes of the cases do not change between versions, so that published cases can be made
+//! again.
 
 use std::fs;
 use std::path::{Path, PathBuf};

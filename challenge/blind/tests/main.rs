@@ -1,4 +1,5 @@
-//! The tests of stretch-blind from outside, one program: linking takes longer than most of them.
+//! The integration tests of stretch-blind, in one program because linking takes longer than most
+//! tests.
 
 mod cases;
 mod frozen;

@@ -1,4 +1,4 @@
-//! Sets that strangers solve: what is made, what a submission must hold, and its score.
+//! Tests of open sets: the files of a set, the requirements on a submission, and its score.
 
 use std::{fs, path::Path, sync::OnceLock};
 
@@ -15,7 +15,8 @@ fn set(dir: &Path, plant: PlantName, seed: u64) -> (OpenTruth, String) {
     OpenTruth::open(&folder).expect("its labels")
 }
 
-/// States the truth of every case with this probability, and nothing of the rest.
+/// A submission that gives the probability `p` to the true hypothesis of each case, and the rest to
+/// a wrong one.
 fn oracle(truth: &OpenTruth, hash: &str, p: f64) -> Submission {
     let answer = |label: &stretch_blind::OpenLabel| {
         let (effects, verdict) = match label.level {
@@ -59,12 +60,12 @@ fn labels_stand_apart_and_levels_come_in_turn() {
         let range = match label.level {
             Level::Nothing => 0.0..=0.0,
             Level::Faint => 0.05..=1.5,
-            // two may hide behind each other in part
+            // two effects may partly compensate each other
             _ => 0.5..=400.0,
         };
         assert!(range.contains(&label.excess), "{label:?}");
     }
-    // no file of the set names what is missing, except the lists of candidates
+    // no file of the set contains the name of a missing effect, except the lists of candidates
     let problems: Vec<String> = truth
         .cases
         .keys()
@@ -111,7 +112,8 @@ fn the_oracle_has_every_point_and_a_guess_does_not() {
     assert_eq!((figure(&figures, "exact").value, figure(&figures, "exact").low), (Some(1.0), 1.0));
     assert_eq!(figure(&figures, "nulls alarmed").value, Some(0.0));
     assert_eq!(figure(&figures, "closed, of oracle").value, Some(1.0));
-    // ten answers of 0.9, all right: a calibration error of 0.1, -ln 0.9 nats
+    // ten answers with probability 0.9 are all right: the calibration error is 0.1, the logarithmic
+    // score -ln 0.9
     assert!((figure(&figures, "calibration error").value.expect("cases") - 0.1).abs() < 1e-12);
     assert!(
         (figure(&figures, "log score, nats").value.expect("cases") + 0.9f64.ln()).abs() < 1e-12
@@ -127,13 +129,13 @@ fn the_oracle_has_every_point_and_a_guess_does_not() {
     assert_eq!(figure(&figures, "foreign: named").value, Some(1.0));
     let right = truth.cases.values().filter(|c| c.effects == ["friction"]).count();
     assert_eq!(figure(&figures, "exact").value, Some(right as f64 / CASES as f64));
-    // nothing was left for what is true and was not said
+    // true hypotheses that the answer does not list have the probability 0
     let log_score = (CASES - right) as f64 * 1000f64.ln() / CASES as f64;
     assert!((figure(&figures, "log score, nats").value.expect("cases") - log_score).abs() < 1e-12);
     assert!(figure(&figures, "exact").low <= figure(&figures, "exact").value.expect("cases"));
 }
 
-/// Alters a good submission and returns the resulting error.
+/// Changes a valid submission and returns the resulting error.
 fn refused(alter: impl FnOnce(&mut Submission)) -> String {
     static SET: OnceLock<(OpenTruth, String)> = OnceLock::new();
     let (truth, hash) = SET.get_or_init(|| {

@@ -1,4 +1,5 @@
-//! Hand-made labels and verdicts, every figure computed by hand.
+//! Tests of the score with labels and verdicts written by hand. All expected values are computed by
+//! hand.
 
 use approx::assert_relative_eq;
 use std::collections::BTreeMap;
@@ -69,14 +70,14 @@ fn singles_are_scored_by_strength() {
     let s = &score.singles;
     assert_eq!(s.top1, rate(1, 4));
     assert_eq!(s.top1_above_10, rate(1, 1));
-    // The leak was placed in sensing, the overlooked hum nowhere.
+    // The leak was assigned to the stage `sensing`, and the hum was not found.
     assert_eq!(s.stage, rate(2, 4));
     assert_eq!(s.set_covers, rate(3, 3));
     let size = s.set_size.expect("sets");
     assert_relative_eq!(size, 4.0 / 3.0, epsilon = 0.0, max_relative = F64_ROUNDING);
     assert_eq!(s.false_unknown, rate(1, 4));
     assert_eq!(score.by_effect["sleeve_slip"], rate(1, 2));
-    // The faint case is no miss.
+    // The faint case is not an error.
     let missed: Vec<&str> = score.misses.iter().map(|m| m.case.as_str()).collect();
     assert_eq!(missed, ["b", "c", "e"]);
     // |0.97 - 1|, |0.6 - 0|, |0 - 0|, |0.5 - 1| over four cases.
@@ -183,7 +184,8 @@ fn a_declared_tie_that_holds_the_truth_is_right_and_an_undeclared_one_wrong() {
     let s = &score.singles;
     assert_eq!((s.top1, s.exact), (rate(2, 3), rate(1, 3)));
     assert_eq!(score.compounds.all_named, rate(1, 1));
-    // "A or B" is stated with 0.9 (a: right; b: wrong); c names two, its first with 0.5.
+    // The tie "A or B" has the probability 0.9; it is right in case a and wrong in case b. Case c
+    // names two effects, the first with 0.5.
     let ece = score.calibration.ece.expect("candidates");
     assert_relative_eq!(ece, (2.0 * 0.4 + 0.5) / 3.0, epsilon = 0.0, max_relative = F64_ROUNDING);
     let missed: Vec<&str> = score.misses.iter().map(|m| m.case.as_str()).collect();

@@ -1,4 +1,4 @@
-//! Draws one case of a plant: parameters, effects with strengths and forms, inputs, noise.
+//! Draws one case of a plant: parameters, effects with strengths and forms, inputs and noise.
 
 use super::{
     label::{FormFamily, Level, OpenLabel},
@@ -6,7 +6,7 @@ use super::{
 };
 use crate::random::RandomGenerator;
 
-/// Trials of a case; the last two are tested on.
+/// Number of trials of a case, and of those for fitting. The last two trials are for testing.
 pub(super) const TRIALS: usize = 6;
 pub(super) const FIT_TRIALS: usize = 4;
 
@@ -22,7 +22,7 @@ pub(super) struct Drawn {
     pub(super) label: OpenLabel,
 }
 
-/// Properties of a case that follow from its number: effects, levels and families alternate.
+/// Draws a case. Its level and effects alternate with its number.
 pub(super) fn draw(
     plant: &'static PlantSpec,
     seed: u64,
@@ -124,7 +124,8 @@ fn chosen(
     }
 }
 
-/// Every second null has the parameters as shipped; all others move within their tolerances.
+/// Draws the parameters within their tolerances. In half of the cases without an effect, they have
+/// their nominal values.
 fn parameters(plant: &PlantSpec, level: Level, random: &mut RandomGenerator) -> Vec<f64> {
     let moves = level != Level::Nothing || random.below(2) == 1;
     let scale = if moves { 0.7 } else { 0.0 };
@@ -134,8 +135,8 @@ fn parameters(plant: &PlantSpec, level: Level, random: &mut RandomGenerator) -> 
         .collect()
 }
 
-/// The strength at which the effect alone has this excess, by halving; the largest strength if none
-/// has.
+/// Finds by bisection the strength at which the effect alone has the excess `target`; the largest
+/// strength if no strength reaches it.
 fn at_excess(plant: &PlantSpec, p: &[f64], act: Act, drives: &[Drive], target: f64) -> Act {
     let (off, most) = act.candidate.range;
     let with = |share: f64| Act { strength: off + (most - off) * share, ..act };
@@ -151,7 +152,8 @@ fn at_excess(plant: &PlantSpec, p: &[f64], act: Act, drives: &[Drive], target: f
     with(high)
 }
 
-/// Steps, stairs, a sum of sines and a triangle over the span of the input; trials of 70 % to 100 % of the greatest length.
+/// Draws the inputs of the trials over the span of the input: random steps, a sum of sines, and a triangle. Trials have
+/// 70 % to 100 % of the greatest length.
 fn drives(plant: &PlantSpec, random: &mut RandomGenerator) -> Vec<Drive> {
     let inputs: Vec<Vec<f64>> = (0..TRIALS).map(|trial| input(plant, trial, random)).collect();
     let total: usize = inputs.iter().map(Vec::len).sum();
@@ -202,7 +204,7 @@ fn input(plant: &PlantSpec, trial: usize, random: &mut RandomGenerator) -> Vec<f
     }
 }
 
-/// Noise of a standard deviation, correlated from sample to sample by `colour`.
+/// Adds noise of a standard deviation; `colour` is its correlation from sample to sample.
 fn add_noise(out: &mut [f64], noise: f64, colour: f64, random: &mut RandomGenerator) {
     let fresh = (1.0 - colour * colour).sqrt();
     let mut e = random.gauss();
@@ -212,9 +214,10 @@ fn add_noise(out: &mut [f64], noise: f64, colour: f64, random: &mut RandomGenera
     }
 }
 
-/// Reduced chi-square minus one that the re-tuned nominal simulator keeps of the noise-free
-/// difference, the sum of both stages over all trials: the minimum over q of |d - S q|^2/n +
-/// |q|^2/n, where d is the difference in units of the noise and S are its slopes per tolerance.
+/// Returns the excess (reduced chi-square minus one) that the re-tuned nominal simulator leaves,
+/// summed over both stages. For each stage it is the minimum over q of |d - S q|^2/n + |q|^2/n. d
+/// is the noise-free difference of the outputs in multiples of the noise, over all trials. S holds
+/// the sensitivities of the output to the parameters, per tolerance.
 fn excess(plant: &PlantSpec, p: &[f64], acts: &[Act], drives: &[Drive]) -> f64 {
     (0..2).map(|stage| in_stage(plant, stage, p, acts, drives)).sum()
 }
@@ -248,8 +251,8 @@ fn in_stage(plant: &PlantSpec, stage: usize, p: &[f64], acts: &[Act], drives: &[
     left(&gap, &slopes) / gap.len() as f64
 }
 
-/// The minimum of |d - S q|^2 + |q|^2, by Gram and Schmidt on the columns of S with the rows of the
-/// prior below them.
+/// Returns the minimum of |d - S q|^2 + |q|^2, by the Gram-Schmidt process on the columns of S,
+/// extended by the identity matrix of the prior.
 fn left(gap: &[f64], slopes: &[Vec<f64>]) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let mut rest = gap.to_vec();
@@ -281,7 +284,7 @@ mod tests {
         let slope: Vec<f64> = (0..50).map(|i| 10.0 * f64::from(i)).collect();
         let other: Vec<f64> = (0..50).map(|i| f64::from(i % 2)).collect();
         let along: Vec<f64> = slope.iter().map(|s| 0.5 * s).collect();
-        // the prior costs half a tolerance squared
+        // the shift of half a tolerance costs 0.5^2
         assert!((left(&along, std::slice::from_ref(&slope)) - 0.25).abs() < 1e-3);
         let both: Vec<f64> = along.iter().zip(&other).map(|(a, b)| a + b).collect();
         assert!(left(&both, &[slope]) > 5.0);

@@ -1,5 +1,5 @@
-//! Labels of an open set: what is missing in each case, the names that an answer may use, and the
-//! families from which the forms of effects are drawn.
+//! Labels of an open set: the missing effects of each case, the names that an answer may use, and
+//! the families from which the forms of effects are drawn.
 
 use std::{
     collections::BTreeMap,
@@ -11,18 +11,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::{effect::worded, error::BlindError, random::RandomGenerator, seal};
 
-/// Deviation of an effect from its textbook form; all 0 is the textbook's.
+/// Deviation of an effect from its textbook form, which has 0 for all three numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Form {
-    /// How round its corners are, 0 .. 1.
+    /// Roundness of the corners, 0 to 1.
     pub softness: f64,
-    /// How far its two directions differ, -0.5 .. 0.5.
+    /// Difference between the two directions, -0.5 to 0.5.
     pub asymmetry: f64,
-    /// How far its inner scales spread, 0 .. 0.9.
+    /// Spread of the internal scales, such as radii or time constants, 0 to 0.9.
     pub spread: f64,
 }
 
-/// Ranges from which forms and disturbances of a case are drawn, uniformly.
+/// Ranges in which the forms and the noise of a case are uniformly distributed.
 ///
 /// ```
 /// let names: Vec<String> = stretch_blind::FormFamily::published().into_iter().map(|f| f.name).collect();
@@ -31,20 +31,20 @@ pub struct Form {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FormFamily {
-    /// Its name, in labels.
+    /// Name in labels.
     pub name: String,
-    /// Of [`Form::softness`].
+    /// Range of [`Form::softness`].
     pub softness: (f64, f64),
-    /// Of [`Form::asymmetry`].
+    /// Range of [`Form::asymmetry`].
     pub asymmetry: (f64, f64),
-    /// Of [`Form::spread`].
+    /// Range of [`Form::spread`].
     pub spread: (f64, f64),
-    /// Correlation of the noise from sample to sample, 0 .. 0.9.
+    /// Range of the correlation of the noise from sample to sample, 0 to 0.9.
     pub colour: (f64, f64),
 }
 
 impl FormFamily {
-    /// The three families that are public.
+    /// Returns the three published families.
     #[must_use]
     pub fn published() -> Vec<Self> {
         let family = |name: &str, softness, asymmetry, spread, colour| Self {
@@ -61,7 +61,8 @@ impl FormFamily {
         ]
     }
 
-    /// Reads one from a JSON file of the same fields. The person who seals a set keeps this file.
+    /// Reads a family from a JSON file with the same fields. The author of a set keeps this file
+    /// private.
     ///
     /// # Errors
     /// A file that cannot be read, a field that is missing or out of its range.
@@ -95,15 +96,15 @@ impl FormFamily {
 }
 
 worded! {
-    /// How hard a case is.
+    /// Difficulty of a case.
     Level {
-        /// One effect, at least 3 times the noise's variance.
+        /// One effect with an excess of at least 3.
         Strong "strong",
-        /// One effect, 0.1 to 1 times the noise's variance.
+        /// One effect with an excess of 0.1 to 1.
         Faint "faint",
         /// Two strong effects.
         Two "two",
-        /// No effect: parameters within their tolerances at most.
+        /// No effect; the parameters may differ from their nominal values within their tolerances.
         Nothing "none",
         /// One strong effect that is not among the candidates.
         Foreign "foreign",
@@ -113,18 +114,18 @@ worded! {
 /// The truth of a case.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OpenLabel {
-    /// How hard it is.
+    /// Difficulty of the case.
     pub level: Level,
-    /// Effects at work.
+    /// Active effects.
     pub effects: Vec<String>,
-    /// Stage of each.
+    /// Stage of each effect.
     pub places: Vec<String>,
     /// Reduced chi-square minus one of the re-tuned nominal simulator, to first order.
     pub excess: f64,
-    /// Share of it that the true effects with the true forms close on the test trials, noise
-    /// included.
+    /// Share of the excess that a simulator with the true effects in their true forms closes on the
+    /// test trials, with noise.
     pub oracle_closed: f64,
-    /// Family of its forms and its noise.
+    /// Family of the forms and the noise.
     pub family: String,
     /// Strength of each effect.
     #[serde(default)]
@@ -132,28 +133,28 @@ pub struct OpenLabel {
     /// Form of each effect.
     #[serde(default)]
     pub forms: Vec<Form>,
-    /// Nominal parameters of this one plant.
+    /// True values of the nominal parameters in this case.
     #[serde(default)]
     pub parameters: BTreeMap<String, f64>,
 }
 
-/// The truth of a set.
+/// All labels of a set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OpenTruth {
     /// Version of this file, 1.
     pub schema: u32,
     /// Plant.
     pub plant: String,
-    /// Seed that the set was made from.
+    /// Seed of the set.
     pub seed: u64,
-    /// Names that an answer may use, with their stage.
+    /// Names that an answer may use, each with its stage.
     pub candidates: BTreeMap<String, String>,
-    /// Truth of each case.
+    /// Label of each case.
     pub cases: BTreeMap<String, OpenLabel>,
 }
 
-/// Where the labels of a set are: in the folder `DIR-sealed` next to the set, which is kept back
-/// when the set is given away.
+/// Returns the folder of the labels of a set: `DIR-sealed` next to the set. It is not published
+/// with the set.
 #[must_use]
 pub fn sealed_beside(set: &Path) -> PathBuf {
     let mut name = set.file_name().unwrap_or_default().to_os_string();
@@ -162,7 +163,7 @@ pub fn sealed_beside(set: &Path) -> PathBuf {
 }
 
 impl OpenTruth {
-    /// Opens the labels of a set, if they match the hash in the set; also returns the hash.
+    /// Opens the labels of a set if they match the hash in the set. Also returns the hash.
     ///
     /// # Errors
     /// A broken seal, or a file that is missing or invalid.

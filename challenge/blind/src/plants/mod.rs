@@ -1,7 +1,8 @@
-//! Sets that strangers solve: makes folders of cases and sealed labels from a plant and a seed.
+//! Makes open sets, on which other methods can be tested: folders of cases of a plant, with sealed
+//! labels, from a seed.
 //!
-//! `servo` and `thermal` are two plants of two stages; `plant` integrates them with operators around; `draw` makes a case;
-//! `label` has the families that its form is drawn from, and its truth.
+//! `servo` and `thermal` define two plants with two stages each. `plant` integrates them, with operators in front of
+//! and behind the stages. `draw` makes a case. `label` has the families of forms and the labels.
 
 mod draw;
 mod label;
@@ -30,7 +31,7 @@ use crate::{
 };
 
 worded! {
-    /// What a set is of.
+    /// The plant of a set.
     PlantName {
         /// Valve, muscle and gauge: the rig of the project.
         Rig "rig",
@@ -41,7 +42,7 @@ worded! {
     }
 }
 
-/// The simulators that are handed out, with their names.
+/// Files of the nominal simulators that are copied into a set.
 const SIMULATORS: [(&str, &str); 4] = [
     ("worker.py", include_str!("../../../python/worker.py")),
     ("plant.py", include_str!("../../../python/plant.py")),
@@ -49,8 +50,8 @@ const SIMULATORS: [(&str, &str); 4] = [
     ("thermal.py", include_str!("../../../python/thermal.py")),
 ];
 
-/// Makes `cases` cases of a plant in a new folder `set`, with the labels in the folder `sealed`; returns
-/// the SHA-256 of the labels. Both may be drafts that are renamed later.
+/// Makes `cases` cases of a plant in the new folder `set`, with the labels in the folder `sealed`.
+/// Returns the SHA-256 of the labels. The caller may rename both folders later.
 ///
 /// Levels alternate, so that a fifth of the cases has each level. `private` is a family of forms
 /// and noise in addition to the published ones. The rig has five families and does not use it.
@@ -108,7 +109,8 @@ pub fn make_set(
     finish((set, sealed), &OpenTruth { schema: 1, plant, seed, candidates, cases: labels? })
 }
 
-/// Seals the labels, and writes what a solver may know of the set: plant, hash, names.
+/// Seals the labels, and writes `set.toml` with the plant, the hash and the names, which a method
+/// may know.
 fn finish((set, sealed): (&Path, &Path), truth: &OpenTruth) -> Result<String, BlindError> {
     let hash = seal::close(set, &sealed.join("truth.json"), "truth.json", truth)?;
     let mut text = format!("schema = 1\nplant = {:?}\nset = \"{hash}\"\n", truth.plant);
@@ -173,10 +175,11 @@ fn problem(plant: &PlantSpec, name: &str) -> String {
     format!("{text}\n{}", plant.effects)
 }
 
-/// Excess below which a single effect is faint.
+/// Excess below which a single effect has the level `faint`.
 const FAINT: f64 = 1.0;
 
-/// The rig's cases in the layout of an open set: the generator and its forms are those of the sealed check.
+/// Makes cases of the rig in the layout of an open set, with the generator and the forms of the sealed
+/// check.
 fn make_rig(set: &Path, cases: usize, seed: u64) -> Result<OpenTruth, BlindError> {
     let each = cases / 5;
     let plan = Plan {
@@ -191,7 +194,7 @@ fn make_rig(set: &Path, cases: usize, seed: u64) -> Result<OpenTruth, BlindError
     };
     make(set, seed, &plan, &|_| ())?;
     let (labels, _) = Truth::open(set)?;
-    // move these labels to the neighbouring folder
+    // remove the labels from the set; they are written to the neighbouring folder
     let inside = set.join("sealed");
     fs::remove_dir_all(&inside).map_err(BlindError::io(&inside))?;
     let mut opened = BTreeMap::new();

@@ -1,5 +1,5 @@
-//! A plant of two stages, the second driven by the output of the first: parameters, candidates,
-//! equations.
+//! A plant with two stages, of which the second is driven by the output of the first: parameters,
+//! candidate effects, equations.
 
 use super::label::Form;
 
@@ -11,17 +11,17 @@ pub(super) struct Parameter {
     pub(super) value: f64,
     /// One standard deviation, as a share of the value.
     pub(super) tolerance: f64,
-    /// Stage it acts in.
+    /// Stage in which it acts.
     pub(super) stage: usize,
 }
 
-/// Something that may be missing from the simulator.
+/// An effect that may be missing from the simulator.
 #[derive(Debug)]
 pub(super) struct Candidate {
     pub(super) name: &'static str,
     pub(super) stage: usize,
     pub(super) action: Action,
-    /// A hardly visible strength, and the largest one that is drawn.
+    /// Strength at which the effect does nothing, and the largest strength that is drawn.
     pub(super) range: (f64, f64),
 }
 
@@ -36,22 +36,22 @@ impl Candidate {
     }
 }
 
-/// An operator on a sampled signal, given the strength, the form and the place of the samples.
+/// An operator on a sampled signal, with the strength, the form and the times of the samples.
 pub(super) type Operator = fn(&[f64], f64, &Form, Grid) -> Vec<f64>;
 
-/// What an effect does.
+/// Place and operation of an effect.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Action {
-    /// In front of the stage.
+    /// Acts on the input of the stage.
     Before(Operator),
-    /// Behind the stage.
+    /// Acts on the output of the stage.
     Behind(Operator),
-    /// Effect inside the differential equation: what it subtracts from the drive, given state,
-    /// strength, form and input.
+    /// Acts in the differential equation. The function returns the amount that is subtracted from
+    /// the drive, from the state, strength, form and input.
     Inside(fn(f64, f64, &Form, f64) -> f64),
 }
 
-/// An effect at work.
+/// An active effect.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Act {
     pub(super) candidate: &'static Candidate,
@@ -59,7 +59,7 @@ pub(super) struct Act {
     pub(super) form: Form,
 }
 
-/// Where the samples of a trial are: their distance in s; its beginning in the session, and their distance as
+/// Times of the samples of a trial: the sample time in s; the start of the trial and the sample time as
 /// shares of the session.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
@@ -75,18 +75,19 @@ pub(super) struct Drive {
     pub(super) grid: Grid,
 }
 
-/// A stage: its output, its noise, and its equation x' = f(x, input, what the effects inside take).
+/// A stage: its output, its noise, and its equation x' = f(x, input, taken). `taken` is the amount
+/// that effects inside subtract from the drive.
 #[derive(Debug)]
 pub(super) struct StageSpec {
     pub(super) name: &'static str,
     pub(super) output: &'static str,
     pub(super) unit: &'static str,
     pub(super) noise: f64,
-    /// Derivative of the states, given states, input, parameters and what the effects inside take from the drive.
+    /// Derivative of the states as a function of states, input, parameters and `taken`.
     pub(super) derivative: fn([f64; 2], f64, &[f64], f64) -> [f64; 2],
     /// States at rest.
     pub(super) rest: [f64; 2],
-    /// Which state is the output.
+    /// Index of the state that is the output.
     pub(super) shown: usize,
     /// Whether the input is held between samples, or linearly interpolated.
     pub(super) is_held: bool,
@@ -97,7 +98,7 @@ pub(super) struct StageSpec {
 pub(super) struct PlantSpec {
     pub(super) name: &'static str,
     pub(super) dt_s: f64,
-    /// Samples of a trial, at most.
+    /// Largest number of samples of a trial.
     pub(super) samples: usize,
     pub(super) input: &'static str,
     pub(super) input_unit: &'static str,
@@ -107,15 +108,15 @@ pub(super) struct PlantSpec {
     pub(super) stages: [StageSpec; 2],
     pub(super) candidates: &'static [Candidate],
     pub(super) foreign: &'static [Candidate],
-    /// Effects of the simulator's own, as lines of a problem file.
+    /// Effects that the simulator itself implements, as lines of a problem file.
     pub(super) effects: &'static str,
 }
 
-/// Steps of integration between two samples; the distributed simulators take four.
+/// Number of integration steps between two samples. The published simulators use four.
 const SUBSTEPS: usize = 12;
 
 impl PlantSpec {
-    /// The noise-free output of a stage for one trial.
+    /// Returns the noise-free output of a stage for one trial.
     pub(super) fn stage(&self, stage: usize, p: &[f64], acts: &[Act], drive: &Drive) -> Vec<f64> {
         let spec = &self.stages[stage];
         let acts: Vec<&Act> = acts.iter().filter(|a| a.candidate.stage == stage).collect();
@@ -160,7 +161,8 @@ impl PlantSpec {
 
 // Operators in front of or behind a stage, on sampled signals, each in a form that need not be in the catalogue.
 
-/// y(t) = x(t - delay), with a part `softness` of it as a lag instead of a dead time.
+/// y(t) = x(t - delay). The share `softness` of the delay is a first-order lag instead of a dead
+/// time.
 pub(super) fn delay(x: &[f64], delay_s: f64, form: &Form, grid: Grid) -> Vec<f64> {
     let dead = delay_s * (1.0 - form.softness) / grid.dt_s;
     let (whole, rest) = (dead.floor() as usize, dead.fract());
@@ -170,7 +172,8 @@ pub(super) fn delay(x: &[f64], delay_s: f64, form: &Form, grid: Grid) -> Vec<f64
     lag(&moved, delay_s * form.softness, &Form::default(), grid)
 }
 
-/// y follows x by two lags of the shares 1 - spread/2 and spread/2 of `tau_s`, exact between samples.
+/// Two first-order lags in series, with time constants of 1 - spread/2 and spread/2 times `tau_s`,
+/// exact for an input that is constant between samples.
 pub(super) fn lag(x: &[f64], tau_s: f64, form: &Form, grid: Grid) -> Vec<f64> {
     let second = 0.5 * form.spread;
     let mut out = x.to_vec();
@@ -188,7 +191,8 @@ pub(super) fn lag(x: &[f64], tau_s: f64, form: &Form, grid: Grid) -> Vec<f64> {
     out
 }
 
-/// Values nearer to zero than `width` do nothing; the corner is rounded by a softplus, and its two sides differ by the asymmetry.
+/// Dead zone: values with a magnitude below `width` have no effect. The corners are rounded by a softplus. The
+/// asymmetry makes the widths of the two sides different.
 pub(super) fn dead_zone(x: &[f64], width: f64, form: &Form, _: Grid) -> Vec<f64> {
     let corner = (form.softness * width).max(1e-9);
     let rise = |z: f64| {
@@ -199,8 +203,8 @@ pub(super) fn dead_zone(x: &[f64], width: f64, form: &Form, _: Grid) -> Vec<f64>
     x.iter().map(|&x| if width < 1e-12 { x } else { rise(x - up) - rise(-x - down) }).collect()
 }
 
-/// Values are limited to `limit` (and its negative): y = x (1 + |x/limit|^q)^(-1/q), q =
-/// 2/softness, and clamped at a softness of 0.
+/// Limits values to the range from -`limit` to `limit`: y = x (1 + |x/limit|^q)^(-1/q) with q =
+/// 2/softness. At a softness of 0, values are clamped.
 pub(super) fn saturation(x: &[f64], limit: f64, form: &Form, _: Grid) -> Vec<f64> {
     x.iter()
         .map(|&x| {
@@ -214,7 +218,7 @@ pub(super) fn saturation(x: &[f64], limit: f64, form: &Form, _: Grid) -> Vec<f64
         .collect()
 }
 
-/// One element with play: it is constant until x is further away than `radius`.
+/// One play operator: the output is constant until x is farther from it than `radius`.
 fn play(x: &[f64], radius: f64) -> Vec<f64> {
     let mut y = x[0];
     x.iter()
@@ -225,7 +229,7 @@ fn play(x: &[f64], radius: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Mean of four plays whose radii spread around `width`.
+/// Mean of four plays with different radii around `width`.
 pub(super) fn backlash(x: &[f64], width: f64, form: &Form, _: Grid) -> Vec<f64> {
     let steps = [-1.0, -0.3, 0.3, 1.0];
     let plays = steps.map(|s| play(x, width * (1.0 + s * form.spread).max(0.0)));
@@ -233,8 +237,8 @@ pub(super) fn backlash(x: &[f64], width: f64, form: &Form, _: Grid) -> Vec<f64> 
     (0..x.len()).map(|i| plays.iter().map(|p| p[i]).sum::<f64>() / 4.0 + shift).collect()
 }
 
-/// x minus a share of what plays of the radii `scale` {1, 1/2, 1/4} hold back, weighted by the
-/// spread.
+/// y = x - share (weighted mean of x - play(x, r)), with the radii r = `scale` {1, 1/2, 1/4}. The
+/// spread sets the weights.
 pub(super) fn hysteresis(x: &[f64], share: f64, scale: f64, form: &Form) -> Vec<f64> {
     let plays = [1.0, 0.5, 0.25].map(|r| play(x, scale * r));
     let weights = [1.0, 1.0 + form.spread, 1.0 - 0.5 * form.spread];
@@ -247,15 +251,16 @@ pub(super) fn hysteresis(x: &[f64], share: f64, scale: f64, form: &Form) -> Vec<
         .collect()
 }
 
-/// x plus a share of its distance from a lagged copy: it overshoots a change, or creeps after it if
-/// the share is negative.
+/// y = x + share (x - lagged x). The output overshoots after a change, or creeps if the share is
+/// negative.
 pub(super) fn relaxation(x: &[f64], share: f64, tau_s: f64, form: &Form, grid: Grid) -> Vec<f64> {
     let spread = 1.0 + 3.0 * form.spread;
     let [fast, slow] = [tau_s / spread, tau_s * spread].map(|s| lag(x, s, &Form::default(), grid));
     (0..x.len()).map(|i| x[i] + share * (x[i] - 0.5 * (fast[i] + slow[i]))).collect()
 }
 
-/// The zero drifts by `change` from the start of the session to its end, bent by the softness.
+/// Drift of the zero by `change` from the start to the end of the session. The softness bends its
+/// course.
 pub(super) fn drift(x: &[f64], change: f64, form: &Form, grid: Grid) -> Vec<f64> {
     let bend = 3.0 * form.softness + 1e-9;
     let shape = |t: f64| (1.0 - (-bend * t).exp()) / (1.0 - (-bend).exp());

@@ -20,13 +20,13 @@ fn drag(w: f64, c: f64, form: &Form, _: f64) -> f64 {
     c * w * w.abs().powf(1.0 + form.softness) / 100f64.powf(1.0 + form.softness)
 }
 
-/// A supply that weakens under load: the drive loses more, the more it has to do. Not in the
+/// A supply whose voltage falls under load: the loss is proportional to u |u|. Not in the
 /// catalogue.
 fn sagging(_: f64, c: f64, _: &Form, u: f64) -> f64 {
     20.0 * c * u * u.abs() / 6.0
 }
 
-/// A pull of the motor's magnets that swings with its speed. Not in the catalogue.
+/// A magnetic force of the motor that varies like a sine of its speed. Not in the catalogue.
 fn resonance(w: f64, c: f64, _: &Form, _: f64) -> f64 {
     c * (w / 9.0).sin()
 }

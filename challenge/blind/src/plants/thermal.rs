@@ -6,25 +6,26 @@ use super::plant::{
     relaxation, saturation,
 };
 
-/// Radiation, W: c (T^4 - 293^4)/1e9 with the absolute temperature T, in a power of 4 plus the softness.
+/// Radiation, W: c (T^4 - 293^4)/1e9 with the absolute temperature T. The exponent is 4 plus the
+/// softness.
 fn radiation(t: f64, c: f64, form: &Form, _: f64) -> f64 {
     let power = 4.0 + form.softness;
     let ratio = (t + 273.15) / 293.15;
     c * 293.15f64.powi(4) / 1e9 * (ratio.powf(power) - 1.0)
 }
 
-/// A draught while the block is hot, W: h rises with a soft step at 50 degC.
+/// A fan that runs while the block is hot, W: the heat transfer coefficient rises at about 50 degC.
 fn fan(t: f64, c: f64, form: &Form, _: f64) -> f64 {
     let width = 1.0 + 8.0 * form.softness + 4.0 * form.spread;
     c * (t - 20.0) / (1.0 + ((50.0 + 20.0 * form.asymmetry - t) / width).exp())
 }
 
-/// Melting: heat that goes into a change of phase near 45 degC while it warms. Not in the catalogue.
+/// Melting: a part of the heat goes into a phase change near 45 degC. Not in the catalogue.
 fn melting(t: f64, c: f64, _: &Form, p: f64) -> f64 {
     c * (p - 0.8 * (t - 20.0)) * (-((t - 45.0) / 6.0).powi(2)).exp()
 }
 
-/// A heater that weakens while it is hot. Not in the catalogue.
+/// A heater whose power falls while the block is hot. Not in the catalogue.
 fn heater(t: f64, c: f64, _: &Form, p: f64) -> f64 {
     c * p * ((t - 20.0) / 60.0).powi(2)
 }

@@ -1,7 +1,7 @@
 #!/bin/sh
-# A check of four cases; then cases of each plant, answered by the program and scored. STRETCH names another program than that of the target
-# folder. STRETCH_DEEP=1: ten cases of each plant instead of three, the baseline where SciPy is installed, and the rig in Python against
-# vectors of an independent implementation where Numba is.
+# Runs a blind check of four cases, then answers and scores a set of each plant. STRETCH is the path of another program than the one in the
+# target folder. With STRETCH_DEEP=1 a set has ten cases instead of three; the baseline is run if SciPy is installed, and the rig in Python is
+# compared with the vectors of an independent implementation if Numba is installed.
 set -eu
 cd "$(dirname "$0")"
 target="${CARGO_TARGET_DIR:-$PWD/../target}"
@@ -10,11 +10,11 @@ cases=3
 [ -z "${STRETCH_DEEP:-}" ] || cases=10
 
 test -x "$program" || cargo build --quiet --locked -p stretch-cli
-# the gate of the project has built it
+# usually the gate of the project has built it before
 test -x "$target/debug/challenge" || cargo build --quiet --locked -p stretch-challenge
 run() { "$target/debug/challenge" "$@"; }
 
-# the page is then looked at in a browser, by web/gate.sh
+# web/gate.sh tests this page in a browser
 check="$target/challenge-check"
 rm -rf "$check"
 run --cases 4 --seed 3 --out "$check"

@@ -1,5 +1,6 @@
-//! Diagnoses a folder of labelled cases, writes the answer into each, and scores: `cargo run
-//! --release -p stretch-challenge --example dev_score -- FOLDER [case-000 ...]`.
+//! Diagnoses a folder of labelled cases, writes each answer into the folder of its case, and scores
+//! the answers: `cargo run --release -p stretch-challenge --example dev_score -- FOLDER [case-000
+//! ...]`.
 
 use std::{fs, path::Path, time::Instant};
 

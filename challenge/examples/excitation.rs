@@ -1,8 +1,8 @@
-//! How often slack and saturation are distinguished with and without one trial at 0.7 of the
-//! excitation.
+//! Counts how often slack and saturation are distinguished, with and without one trial at 0.7 of
+//! the excitation.
 //!
-//! Twenty simulated sessions, ten of each effect, in the catalogue's forms. Each is diagnosed
-//! unchanged, without its pressure, and with the further trial.
+//! There are twenty simulated sessions, ten with each effect, in the forms of the catalogue. Each
+//! is diagnosed unchanged, without its pressure, and with the additional trial.
 //!
 //! `cargo run --release -p stretch-challenge --example excitation`
 
@@ -16,12 +16,13 @@ use simulated::{Protocol, Source};
 use stretch_gap::Options;
 use stretch_sim::{EffectParameter, effect_named};
 
-/// Effects named at once.
+/// Largest number of effects that are named together.
 const TWO: NonZeroUsize = NonZeroUsize::MIN.saturating_add(1);
-/// Sessions of each effect.
+/// Number of sessions with each effect.
 const EACH: u64 = 10;
 
-/// A session with one effect of this strength, its other parameters as usual.
+/// Returns a session with one effect, given one of its parameters; its other parameters have their
+/// usual values.
 fn source(name: &str, parameter: &str, value: f64, seed: u64) -> anyhow::Result<Source> {
     let effect = effect_named(name).context("an effect of the catalogue")?;
     let one = |p: &EffectParameter| match p.name == parameter {
@@ -33,7 +34,7 @@ fn source(name: &str, parameter: &str, value: f64, seed: u64) -> anyhow::Result<
 }
 
 fn main() -> anyhow::Result<()> {
-    // right alone, right or tied, wrong
+    // counts of: named alone; named or tied; wrong
     let mut counts = [[0_usize; 3]; Protocol::ALL.len()];
     for case in 0..2 * EACH {
         let strength = 0.3 + 0.07 * (case / 2) as f64;

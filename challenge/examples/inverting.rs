@@ -1,14 +1,15 @@
-//! What a calibration gains from the diagnosis, compared with one that knows the truth: `cargo run
-//! --release -p stretch-challenge --example inverting -- FOLDER [CASES]`.
+//! Measures how much a diagnosis improves a calibration, compared with a calibration that knows the
+//! true effects: `cargo run --release -p stretch-challenge --example inverting -- FOLDER [CASES]`.
 //!
-//! FOLDER holds sealed cases (`challenge make`). The first CASES (20) whose effects are one to
-//! three of the sensing stage with an excess of 5 or more are used. Each is calibrated on its fit
-//! trials with the published method, poly13, the observer and the effects that a diagnosis of the
-//! gauge alone names, and judged on its test trials.
+//! FOLDER holds sealed cases (`challenge make`). The example uses the first CASES (default 20) that
+//! have one to three effects, all of the sensing stage, with an excess of 5 or more. It fits
+//! several calibrations to the fit trials of each case (the published method, poly13, the observer,
+//! and a model of the effects that a diagnosis of the gauge alone names), and computes their errors
+//! on the test trials.
 //!
-//! The **oracle** knows the true effects, their numbers from fit and test trials together, and
-//! inverts them with a thousand particles. No filter with that motion prior could remove its
-//! remaining error.
+//! The **oracle** is a particle filter that knows the true effects, with parameters fitted to fit
+//! and test trials together. No filter with the same prior of the motion could have a smaller
+//! error.
 
 use std::path::Path;
 
@@ -25,14 +26,15 @@ use stretch_sim::{Catalogue, RigStage, effect_named};
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
 
-/// Default number of cases, and the smallest excess of one.
+/// Default number of cases, and the smallest excess of a case.
 const CASES: usize = 20;
 const LEAST_EXCESS: f64 = 5.0;
-/// Densities of the random walk of the rate that the oracle tries, in 1/s^3; the best on the test trials counts.
+/// Spectral densities of the random walk of the rate that the oracle tries, 1/s^3. The one with the smallest
+/// error on the test trials is used.
 const AGILITIES: [f64; 3] = [3.0, 30.0, 300.0];
-/// Particles of the oracle.
+/// Number of particles of the oracle.
 const PARTICLES: usize = 1000;
-/// Samples at a trial's start that are not judged.
+/// Number of samples at the start of a trial that are not scored.
 const SETTLE: usize = 20;
 
 fn main() -> Result<(), Failure> {
@@ -126,8 +128,8 @@ fn row(folder: &Path, name: &str, label: &Label) -> Result<Row, Failure> {
     })
 }
 
-/// The effects that a diagnosis of the gauge alone names, as `stretch calibrate --model diagnosed`
-/// requests it.
+/// Returns the effects that a diagnosis of the gauge alone names, with the options of `stretch
+/// calibrate --model diagnosed`.
 fn named(trials: &[Trial]) -> Result<Vec<Cause>, Failure> {
     let session: Vec<SessionTrial> = trials.iter().cloned().map(SessionTrial::new).collect();
     let gauge = GaugeSimulator::new(&GaugeSetup {
@@ -155,7 +157,7 @@ fn errors(calibration: &Calibration, trials: &[Trial]) -> Result<Errors, Failure
     Ok([mean(false), mean(true)])
 }
 
-/// The errors of a particle filter on a map that was fitted with the true effects.
+/// Returns the errors of a particle filter with a map that was fitted with the true effects.
 fn oracle(calibration: &Calibration, agility: f64, trials: &[Trial]) -> Result<Errors, Failure> {
     let mut sums = [(0.0, 0.0); 2];
     for trial in trials {
@@ -175,7 +177,7 @@ fn oracle(calibration: &Calibration, agility: f64, trials: &[Trial]) -> Result<E
     Ok(sums.map(|(sum, n)| (sum / n).sqrt()))
 }
 
-/// A target, its rate, and the defects that go with it.
+/// A particle: the target, its rate, and the states of the effects.
 #[derive(Clone, Copy)]
 struct Particle {
     y: f64,
@@ -183,8 +185,8 @@ struct Particle {
     defects: DefectsMemory<f64>,
 }
 
-/// Share of the rates that change abruptly, because motions begin and end within a sample, and the factor by which these
-/// changes exceed others.
+/// Probability that a rate changes abruptly, because motions begin and end within a sample, and the ratio of these
+/// changes to the usual ones.
 const LEAPS: f64 = 0.03;
 const LEAP: f64 = 10.0;
 
@@ -211,7 +213,7 @@ fn particles(calibration: &Calibration, agility: f64, trial: &Trial) -> Result<V
     let mut cloud: Vec<Particle> = spread.map(begin).collect();
     let mut weights = vec![1.0 / PARTICLES as f64; PARTICLES];
     let mut estimates = Vec::with_capacity(volts.len());
-    // a baseline is followed as live
+    // the baseline is tracked as in a live receptor
     let (polarity, rate) = (calibration.spec().polarity, calibration.spec().sample_rate_hz);
     let level = RestLevel::<f64>::new(map.rest, polarity, calibration.spec().signal_range, rate);
     let mut baseline = level.memory();
@@ -224,7 +226,7 @@ fn particles(calibration: &Calibration, agility: f64, trial: &Trial) -> Result<V
             particle.y = (particle.y + dt_s * particle.rate).clamp(range.min, range.max);
             let drive = defects.advance(&mut particle.defects, particle.y, pressure(i));
             let apart = (v - on_curve(map, drive)) / map.noise;
-            // heavy tails: a spike leaves no cloud without weight
+            // heavy tails, so that a spike does not reduce all weights to zero
             *weight *= if v.is_finite() { (1.0 + apart * apart / 4.0).powf(-2.5) } else { 1.0 };
             total += *weight;
         }

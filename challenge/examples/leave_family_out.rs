@@ -1,9 +1,9 @@
-//! Every family of forms judged by a diagnosis that was calibrated without it:
-//! `cargo run --release -p stretch-challenge --example leave_family_out -- FOLDER`.
+//! Scores each family of forms with a diagnosis that was calibrated without this family: `cargo run
+//! --release -p stretch-challenge --example leave_family_out -- FOLDER`.
 //!
 //! FOLDER holds cases of several families (`challenge make`) that were diagnosed once
-//! (`challenge run`). For each family temperature and borders are calibrated on the answers of the
-//! others, and its own cases are diagnosed again with them.
+//! (`challenge run`). For each family, the thresholds of `unknown` are calibrated on the answers of
+//! the other families, and the cases of the family are diagnosed again with these thresholds.
 
 use std::{fs, path::Path};
 

@@ -1,8 +1,7 @@
-//! Calibrates the numbers that turn scores into probabilities and gaps into `unknown`, on labelled
-//! cases that were diagnosed: `cargo run --release -p stretch-challenge --example thresholds --
-//! [--write] FOLDER...`.
+//! Calibrates the thresholds that decide when a gap is `unknown`, on diagnosed cases with labels:
+//! `cargo run --release -p stretch-challenge --example thresholds -- [--write] FOLDER...`.
 //!
-//! `challenge make` and `challenge run` make such folders, `dev_score` too. The thresholds that
+//! `challenge make` and `challenge run`, or `dev_score`, make such folders. The thresholds that
 //! control the search itself (`null_excess`, `rise`, `share`, `model_discrepancy`) act while a case
 //! is diagnosed, so they are not changed.
 

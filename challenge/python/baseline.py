@@ -1,4 +1,4 @@
-"""The baseline: re-tune the nominal simulator, add each candidate in turn, pick the least error on a trial that was held out.
+"""The baseline: re-tunes the nominal simulator, adds each candidate in turn, and picks the one with the least error on a held-out trial.
 
     python3 baseline.py SET submission.json
 """
@@ -8,18 +8,18 @@ import numpy as np
 
 from case import solve
 
-LEAST_GAIN = 0.02  # share of the held-out error that an effect must take away to be named
-CONFIDENT = 0.9  # said of what is picked; the rest is spread evenly over all other answers
+LEAST_GAIN = 0.02  # smallest reduction of the held-out error, as a share, for which an effect is named
+CONFIDENT = 0.9  # probability of the picked answer; the rest is divided equally among all other answers
 
 
 def held_out_error(case, stage, names):
-    """Root mean square, in units of the noise, on the last trial that may be fitted, by a fit to those before it."""
+    """Root mean square error, in multiples of the noise, on the last fit trial, after a fit to the other fit trials."""
     p, effects, _ = case.retune(stage, names, trials=case.fit[:-1])
     return float(np.sqrt(np.mean(case.residual(stage, p, effects, case.fit[-1:]) ** 2)))
 
 
 def baseline(case):
-    """Answers a case: what may be missing with its probability, a verdict, a place, the share that it closes."""
+    """Answers a case: the hypotheses with probabilities, the verdict, the stage, and the closed share of the gap."""
     plain = [held_out_error(case, stage, []) for stage in case.stages]
     gains = {}
     for name in case.places:

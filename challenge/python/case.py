@@ -1,4 +1,4 @@
-"""A case of the challenge as a method sees it: trials, candidates, a fit; and the answers that `challenge score` takes."""
+"""A case of the challenge for a method: its trials, candidates and fits; and the writing of answers for `challenge score`."""
 import importlib
 import json
 import sys
@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 import operators
 
-# arguments of each kind: (off, start, most), as shares of the span of the channel where they are no time or share
+# arguments of each kind: (scale, off, start, most). Times are in sample times, shares as they are, all others relative to the channel
 KINDS = {
     "delay": [("time", 0.0, 2.0, 12.0)], "lag": [("time", 0.0, 3.0, 20.0)],
     "dead_zone": [("span", 0.0, 0.04, 0.3)], "saturation": [("top", 1.02, 0.8, 0.2)],
@@ -23,7 +23,7 @@ OWN = {"friction": (0.0, 4.0, 40.0), "drag": (0.0, 8.0, 80.0), "radiation": (0.0
 
 
 class Case:
-    """A folder with problem.toml, read; `runs` counts the runs of the simulator, one for each stage of a model."""
+    """A case that was read from a folder with problem.toml. `runs` counts the simulated stages."""
 
     stages = range(2)
 
@@ -50,27 +50,27 @@ class Case:
         return self.p0, self.tolerance
 
     def centre(self, stage):
-        """Parameters that simulations are drawn around, and how far."""
+        """Mean and standard deviation of the parameters of random simulations."""
         return self.p0, 0.7 * self.tolerance
 
     def is_signed(self, name):
-        """Whether the first argument of a candidate goes below its off as well."""
+        """Whether the first argument of a candidate may also be below its off value."""
         return False
 
     def free(self, name):
-        """How many numbers a candidate brings into a fit."""
+        """Number of fitted numbers of a candidate."""
         return len(self.arguments(name))
 
     def in_noise(self, stage, gap, trials):
-        """A difference of outputs in units of the noise."""
+        """A difference of outputs in multiples of the noise."""
         return gap / self.plant.NOISE[stage]
 
     def noisy(self, stage, values, random):
-        """Simulated outputs of the trials that may be fitted, with noise."""
+        """Simulated outputs of the fit trials, with noise."""
         return values + self.plant.NOISE[stage] * random.normal(size=len(values))
 
     def trial_lengths(self, stage):
-        """How many residuals each trial has that may be fitted."""
+        """Number of residuals of each fit trial."""
         return [len(self.trials[i][1]) for i in self.fit]
 
     def arguments(self, name):
@@ -84,7 +84,7 @@ class Case:
         return [tuple(unit[scale] * x for x in triple) for scale, *triple in KINDS[kind]]
 
     def simulate(self, stage, p, effects, trials):
-        """The outputs of a stage for some trials, driven by what was measured; `effects` are {name: arguments}."""
+        """Outputs of a stage for some trials, driven by the measured input. `effects` is {name: arguments}."""
         self.runs += 1
         inside = np.array([effects[e][0] if e in effects else 0.0 for e in self.plant.EFFECTS])
         around = [(*name.split("."), values) for name, values in effects.items() if name not in OWN]
@@ -105,12 +105,12 @@ class Case:
         return np.concatenate([self.trials[i][1][self.columns[stage + 1]] for i in trials])
 
     def residual(self, stage, p, effects, trials):
-        """Measured less simulated, in units of the noise."""
+        """Measured minus simulated output, in multiples of the noise."""
         gap = self.measured(stage, trials) - self.simulate(stage, p, effects, trials)
         return self.in_noise(stage, gap, trials)
 
     def retune(self, stage, names=(), trials=None, start=None):
-        """Parameters and arguments that fit best, the parameters held by their tolerances: (p, effects, sum of squares)."""
+        """Best fit of parameters, with their tolerances as prior, and arguments: (p, effects, sum of squares)."""
         trials, names = self.fit if trials is None else trials, list(names)
         triples = [triple for name in names for triple in self.arguments(name)]
         off, begin, most = (np.array([t[k] for t in triples]) for k in range(3))
@@ -132,7 +132,7 @@ class Case:
         return p0 + tolerance * found.x[:n], effects_at(found.x), float(2.0 * found.cost)
 
     def shared_out(self, names, values):
-        """{name: arguments} of arguments in a row."""
+        """Splits a list of arguments into {name: arguments}."""
         at, out = 0, {}
         for name in names:
             count = len(self.arguments(name))
@@ -140,7 +140,7 @@ class Case:
         return out
 
     def search(self, stage, names):
-        """What any optimiser may make least over parameters and arguments, where it begins, least and greatest."""
+        """For any optimiser: the cost as a function of parameters and arguments, the start, and the lower and upper bounds."""
         off, most = (np.array([t[k] for n in names for t in self.arguments(n)]) for k in (0, 2))
         p0, tolerance = self.nominal(stage)
         n = len(p0)
@@ -155,11 +155,11 @@ class Case:
         return cost, begin, np.r_[-3.0 * np.ones(n), self.least(names)], np.r_[3.0 * np.ones(n), np.ones(len(off))]
 
     def least(self, names):
-        """Least share of the range of each argument: -1 for the first of what has either sign, else 0."""
+        """Lower bound of each argument, as a share of its range: -1 for the first argument of a candidate with either sign, else 0."""
         return np.array([-1.0 if k == 0 and self.is_signed(n) else 0.0 for n in names for k in range(len(self.arguments(n)))])
 
     def closed(self, names):
-        """Share of the gap of the test trials that these effects close once re-tuned: excess of chi-square before and after."""
+        """Share of the gap on the test trials that these effects close: 1 - (excess with them)/(excess without), both re-tuned."""
         before = after = 0.0
         for stage in self.stages:
             count = len(self.measured(stage, self.test))
@@ -171,15 +171,15 @@ class Case:
 
 
 def load(folder):
-    """The cases of a set: (set.toml, plant, names of cases, places by candidate)."""
+    """Reads a set: (set.toml, module of the plant, names of the cases, stage of each candidate)."""
     about = tomllib.loads((Path(folder) / "set.toml").read_text())
     places = {c["name"]: c["place"] for c in about["candidate"]}
     return about, importlib.import_module(about["plant"]), about["cases"], places
 
 
 def asked(folder, case, method, plant, places):
-    """One case of a set put to a method: the answer in the layout of a submission. A method takes a Case and gives
-    (list of (effects, probability), verdict, place or None, closed share)."""
+    """Runs a method on one case of a set, and returns the answer in the layout of a submission. A method takes a Case and
+    returns (list of (effects, probability), verdict, place or None, closed share)."""
     began, kind = time.process_time(), Case
     if plant.NAME == "rig":
         from rig_case import RigCase as kind
@@ -192,7 +192,7 @@ def asked(folder, case, method, plant, places):
 
 
 def solve(folder, method, name, setup, out, limit=None):
-    """Asks a method of every case and writes the submission, anew after each case."""
+    """Runs a method on every case, and writes the submission after each case."""
     about, plant, names, places = load(folder)
     cases = {}
     for case in names[:limit]:
@@ -203,7 +203,7 @@ def solve(folder, method, name, setup, out, limit=None):
 
 
 def hand_in(answers, out):
-    """Writes a submission whole or not at all, so that one that is stopped holds the cases that were answered."""
+    """Writes a submission completely or not at all. If the program is stopped, the file holds all cases answered so far."""
     draft = Path(f"{out}.draft")
     draft.write_text(json.dumps(answers, indent=1) + "\n")
     draft.replace(out)

@@ -1,8 +1,8 @@
-"""Every method on some sets, case by case, so that what is stopped holds the same cases for each; goes on where it was stopped.
+"""Runs all methods on some sets, case by case, so that all have answered the same cases if the program is stopped. Continues a stopped run.
 
     python3 field.py OUT STRETCH SET... [--methods stretch,bic]
 
-writes OUT/SET.METHOD.json (`neural` and `ratio` after neural.py and ratio.py have learnt), in which seconds are of one processor, the case read included.
+writes OUT/SET.METHOD.json. Run neural.py and ratio.py before the methods `neural` and `ratio`. Times are processor times and include reading the case.
 """
 import argparse
 import json

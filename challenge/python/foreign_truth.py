@@ -1,9 +1,9 @@
-"""Another generator's cases of the rig in the layout of a set, so that `challenge score` scores its run.
+"""Converts cases of the rig from another generator to the layout of a set, so that `challenge score` can score a run on them.
 
     python3 foreign_truth.py truth.json REPORTS RIG_SET OUT
 
-`truth.json` holds {"seed", "cases": {name: {"kind", "effects", "stages", "excess"}}}, REPORTS what
-`stretch diagnose --json=FILE` wrote for each case, RIG_SET any rig set of the challenge (for the names of candidates).
+`truth.json` holds {"seed", "cases": {name: {"kind", "effects", "stages", "excess"}}}, REPORTS the folder of the
+files that `stretch diagnose --json=FILE` wrote, RIG_SET any rig set of the challenge (for the names of candidates).
 Writes OUT, OUT-sealed and OUT.json, the submission. A kind is single, null, compound or out_of_catalogue. 
 """
 import hashlib
@@ -17,7 +17,7 @@ from own import converted
 
 
 def level(case):
-    """The level of the challenge that a kind of case is."""
+    """Level in the challenge of a kind of case."""
     single = "faint" if case["excess"] < 1.0 else "strong"
     return {"single": single, "null": "none", "compound": "two", "out_of_catalogue": "foreign"}[case["kind"]]
 

@@ -1,8 +1,8 @@
-"""A rival that learns once for a plant and then answers in no time: neural posterior estimation of which effects act.
+"""A method for comparison that is trained once per plant and then answers fast: neural posterior estimation of the active effects.
 
     python3 neural.py DEVELOPMENT_SET [draws]
 
-learns from simulations of the inputs of a development set, whose labels are not read, and writes `PLANT.net` here.
+trains on simulations with the inputs of a development set, whose labels are not read, and writes `PLANT.net` to this folder.
 """
 import pickle
 import sys
@@ -15,12 +15,12 @@ from case import Case, load
 from rivals import named
 from simulated import Summary, drawn, hypotheses
 
-DRAWS = {"servo": 150, "thermal": 150, "rig": 150}  # simulations of each case of the development set
-PRIOR = (0.25, 0.5, 0.25)  # of nothing, of one effect, of two
+DRAWS = {"servo": 150, "thermal": 150, "rig": 150}  # number of simulations for each case of the development set
+PRIOR = (0.25, 0.5, 0.25)  # prior probabilities of no, one and two effects
 
 
 def shown(case, random, draws):
-    """Summaries of simulations of a case, and which effects acted in each."""
+    """Summary statistics of simulations of a case, and the effects that acted in each."""
     summary, by_size = Summary(case), [[], [], []]
     for hypothesis in hypotheses(case):
         by_size[len(hypothesis)].append(hypothesis)
@@ -34,7 +34,7 @@ def shown(case, random, draws):
 
 
 def simulations(folder, draws=None):
-    """Summaries and labels for each width of summaries (the rig has two: with and without a pressure), and how many runs."""
+    """Summary statistics and labels by the number of statistics (the rig has two: with and without pressure), and the number of runs."""
     runs, random, by_width = 0, np.random.default_rng(1), {}
     about, plant, names, places = load(folder)
     kind = Case
@@ -51,7 +51,7 @@ def simulations(folder, draws=None):
 
 
 def learn(folder, draws=None):
-    """A net for each width of summaries, and what they cost."""
+    """Trains a network for each number of summary statistics. Returns the networks with their cost."""
     from sklearn.neural_network import MLPClassifier
     from sklearn.pipeline import make_pipeline
     from sklearn.preprocessing import StandardScaler
@@ -64,7 +64,7 @@ def learn(folder, draws=None):
 
 
 def remembered(case, ending):
-    """What was learnt for the plant of a case, and the numbers that its network is asked about."""
+    """Returns the networks for the plant of a case, and the summary statistics of the case."""
     learnt = pickle.loads((Path(__file__).parent / f"{case.plant.NAME}.{ending}").read_bytes())
     seen = Summary(case).of([case.measured(stage, case.fit) for stage in case.stages])
     if len(seen) not in learnt["nets"]:

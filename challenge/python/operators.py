@@ -1,4 +1,4 @@
-"""Candidates around a stage, in the textbook form of `stretch effects kinds`: each takes and gives a sampled signal."""
+"""Candidates around a stage, in the textbook forms of `stretch effects kinds`. Each maps a sampled signal to a sampled signal."""
 import numpy as np
 
 from plant import njit
@@ -17,7 +17,7 @@ def lagged(x, tau_s, dt_s):
 
 @njit(cache=True)
 def played(x, width):
-    """y stays until x is farther off than the width."""
+    """y is constant until x is farther from it than the width."""
     out, y = np.empty_like(x), x[0]
     for i in range(len(x)):
         y = min(max(y, x[i] - width), x[i] + width)

@@ -1,4 +1,4 @@
-"""The program's own row: `python3 own.py SET STRETCH submission.json [cases]`
+"""Answers a set with the program stretch: `python3 own.py SET STRETCH submission.json [cases]`
 
 runs `stretch diagnose`, as it ships, on every problem.toml.
 """
@@ -20,13 +20,13 @@ SETUP = "as shipped, no option but one thread; its thresholds were calibrated on
 
 
 def used_s():
-    """Processor time of all children that have ended, workers included."""
+    """Processor time of all child processes that have ended, including workers."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
 def answer(case, program, places):
-    """Runs one diagnosis; hands back the answer in the layout of a submission."""
+    """Runs one diagnosis, and returns the answer in the layout of a submission."""
     with tempfile.TemporaryDirectory() as folder:
         out, began = Path(folder) / "d.json", used_s()
         command = [program, "diagnose", str(case / "problem.toml"), f"--json={out}", "--quiet"]

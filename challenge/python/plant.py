@@ -1,4 +1,4 @@
-"""Numba where it is installed; without it every simulator and operator runs as it is, only slower."""
+"""Uses numba if it is installed. Without numba all simulators and operators run in Python, which is slower."""
 try:
     from numba import njit
 except ImportError:

@@ -1,8 +1,8 @@
-"""A rival of the package `sbi`: neural ratio estimation of which effects act.
+"""A method for comparison from the package `sbi`: neural ratio estimation of the active effects.
 
     python3 ratio.py DEVELOPMENT_SET [draws]
 
-learns from the simulations that `neural.py` learns from, and writes `PLANT.ratio` here. It needs PyTorch and `sbi`.
+trains on the same simulations as `neural.py`, and writes `PLANT.ratio` to this folder. It needs PyTorch and `sbi`.
 """
 import time
 
@@ -15,12 +15,12 @@ from simulated import hypotheses
 
 
 def indicators(names, labels):
-    """One row a hypothesis: 1 for each effect that acts."""
+    """One row per hypothesis, with 1 for each effect that acts and 0 for the others."""
     return np.array([[float(name in label) for name in names] for label in labels], dtype=np.float32)
 
 
 def learn(folder, draws=None):
-    """A ratio estimator for each width of summaries, and what they cost."""
+    """Trains a ratio estimator for each number of summary statistics. Returns the estimators with their cost."""
     import torch
     from sbi.inference import SNRE_B
     torch.manual_seed(1)
@@ -40,7 +40,7 @@ def ratio(case):
     """Neural ratio estimation with a model indicator (sbi 0.22, SNRE_B, its residual network and its defaults, amortised): the
     indicator is one number an effect, 1 where it acts; simulations, summaries and priors as of the neural posterior; nothing is
     tuned; its training is not among the simulations of a case."""
-    import sbi.inference  # before a network of its is read: its modules import each other
+    import sbi.inference  # needed before a stored network is loaded, because modules of sbi import each other
     import torch
     torch.set_num_threads(1)
     learnt, seen = remembered(case, "ratio")

@@ -1,6 +1,6 @@
-"""The rig as plain Python: valve and chamber, muscle, sleeve and gauge, reference, and what may be missing from them.
+"""The rig in plain Python: valves and chamber, muscle, sleeve and gauge, reference, and the effects that may be missing.
 
-Equations are those of the documentation of the rig, each candidate in the textbook's form. Units are SI, lengths mm; one step a sample.
+The equations are those of the documentation of the rig; candidates have textbook forms. Units are SI except lengths (mm). One step per sample.
 """
 import numpy as np
 
@@ -9,7 +9,7 @@ from rig_operators import elastic, faded, hysteresis, lagged, late, limited, osc
 
 NAME, DT_S, RATE_HZ = "rig", 0.01, 100.0
 INPUTS, OUTPUTS = ("inlet", "outlet"), ("pressure_kpa", "length_mm", "bridge_v")
-STAGES = ("pneumatics", "body")  # that are fitted one by one: the body is muscle, gauge and reference, which share a length
+STAGES = ("pneumatics", "body")  # fitted one by one; the body is muscle, gauge and reference, which share the length
 STAGE_OF_PLACE = {"pneumatics": 0, "muscle": 1, "sensing": 1, "reference": 1}
 P_ATM, GAS, RHO_0, V_0 = 101325.0, 287.05 * 293.15, 1.185, 25e-6
 L_0, P_REF = 180.0, 620e3
@@ -19,7 +19,7 @@ PARAMETERS = ({"P_s": 620e3, "C_in": 1e-9, "C_out": 1e-9, "b": 0.35, "u_min": 0.
 TOLERANCES = ({"P_s": 6.2e3, "C_in": 3e-10, "C_out": 3e-10, "b": 0.035, "u_min": 0.004},
               {"k_max": 0.0162, "a0": 0.0291, "a1": 0.207, "a3": 0.0268, "tau_m": 0.015, "e0": 0.022, "R0": 0.4, "beta": 0.01,
                "V_exc": 0.012, "G": 0.1, "V_ref": 0.02})
-# arguments of each candidate: (off, start, most); what may have either sign goes as far below its off
+# arguments of each candidate: (off, start, most); a candidate with either sign has the same range below its off value
 ARGUMENTS = {
     "supply_sag": [(0.0, 4e7, 4e8)], "valve_delay": [(0.0, 0.02, 0.12)], "valve_deadband": [(0.0, 0.02, 0.11)],
     "leak": [(0.0, 2e-11, 2e-10)], "chamber_volume": [(0.0, 0.5, 3.0)],
@@ -38,7 +38,7 @@ SIGNED = ("pressure_crosstalk", "gauge_relaxation", "gauge_nonlinearity", "therm
 
 @njit(cache=True)
 def flow(conductance, above, below, b):
-    """ISO 6358: kg/s from one absolute pressure to a lower one."""
+    """Flow of ISO 6358 from one absolute pressure to a lower one, kg/s."""
     r = below / above
     if r >= 1.0 or conductance <= 0.0:
         return 0.0
@@ -48,7 +48,7 @@ def flow(conductance, above, below, b):
 
 @njit(cache=True)
 def rates(held, sag, volume, c_in, c_out, p, e):
-    """Of what the chamber holds (p V/V0, Pa) and of the sag of the supply."""
+    """Rates of change of the chamber's content (p V/V0, Pa) and of the sag of the supply."""
     pressure = held / volume
     drawn = flow(c_in, p[0] + P_ATM - sag, pressure, p[3])
     net = drawn - flow(c_out, pressure, P_ATM, p[3]) - e[3] * (pressure - P_ATM)
@@ -68,7 +68,7 @@ def pneumatics(inlet, outlet, y, start_kpa, p, e):
     volume = 1.0 + e[4] * y[0]
     held, sag = (1e3 * start_kpa + P_ATM) * volume, 0.0
     whole = int(e[1] * RATE_HZ)
-    part = e[1] * RATE_HZ - whole  # share of a sample in which the older command is still at work
+    part = e[1] * RATE_HZ - whole  # share of a sample in which the previous command still acts
     for i in range(n):
         out[i] = 1e-3 * (held / volume - P_ATM)
         following = 1.0 + e[4] * y[min(i + 1, n - 1)]
@@ -90,7 +90,7 @@ def pneumatics(inlet, outlet, y, start_kpa, p, e):
             sag += h / 6.0 * (s1 + 2.0 * s2 + 2.0 * s3 + s4)
             top, bottom = (p[0] + P_ATM - sag) * after, P_ATM * after
             if c_in > 0.0 and held <= top:
-                fresh = min(fresh, top)  # no flow passes the pressure that drives it
+                fresh = min(fresh, top)  # the chamber cannot exceed the pressure that drives the flow
             if c_out > 0.0 and held >= bottom:
                 fresh = max(fresh, bottom)
             held, volume = fresh, after
@@ -98,7 +98,7 @@ def pneumatics(inlet, outlet, y, start_kpa, p, e):
 
 
 def static_law(p):
-    """Contractions of pressures 0.5 kPa apart, without force."""
+    """Contractions without a load, at pressures in steps of 0.5 kPa."""
     x = np.linspace(0.0, 1.6, 1601)
     pressures = P_REF * p["a0"] * (1.0 - np.exp(-p["a1"] * x)) * np.exp(p["a3"] * x * x)
     return np.interp(500.0 * np.arange(2001), pressures, p["k_max"] * x)
@@ -115,7 +115,7 @@ def read_off(table, pressure_kpa):
 
 
 def muscle(pressure_kpa, wound, p, e):
-    """Length, mm. `wound` is the way that it went before: 1 up, -1 down, 0 settled; e: {candidate: arguments}."""
+    """Length, mm. `wound` is the direction of the contraction before the trial: 1 up, -1 down, 0 settled. e: {candidate: arguments}."""
     k = read_off(static_law(p), pressure_kpa)
     if "muscle_hysteresis" in e:
         k = hysteresis(k, *e["muscle_hysteresis"], wound)
@@ -129,7 +129,7 @@ def muscle(pressure_kpa, wound, p, e):
 
 
 def reference(length_mm, wound, p, e):
-    """What the potentiometer shows of a length, mm."""
+    """Length that the potentiometer shows, mm."""
     if "pot_nonlinearity" in e:
         y = (1.0 - length_mm / L_0) / p["k_max"]
         length_mm = length_mm + e["pot_nonlinearity"][0] * 4.0 * y * (1.0 - y)
@@ -139,7 +139,7 @@ def reference(length_mm, wound, p, e):
 
 
 def unreferenced(shown_mm, moving, p, e):
-    """The length behind what the potentiometer shows; `moving` is its direction, 1 while it grows."""
+    """True length from the length that the potentiometer shows. `moving` is the direction of the length, 1 while it grows."""
     length = shown_mm + moving * e["pot_backlash"][0] if "pot_backlash" in e else shown_mm
     if "pot_nonlinearity" in e:
         shown = length
@@ -150,7 +150,7 @@ def unreferenced(shown_mm, moving, p, e):
 
 
 def resistance(length_mm, pressure_kpa, wound, t_s, travel, p, e):
-    """Ohm. `t_s` is the time since the session began and since the trial did, `travel` what the strain had gone before."""
+    """Resistance, ohm. `t_s` is the time since the start of the session and of the trial, `travel` the travel of the strain before the trial."""
     strain = (1.0 + p["e0"]) * length_mm / L_0 - 1.0
     if "sleeve_slack" in e:
         strain = elastic(strain, e["sleeve_slack"][0], 0.003)
@@ -179,7 +179,7 @@ def resistance(length_mm, pressure_kpa, wound, t_s, travel, p, e):
 
 
 def sensing(length_mm, pressure_kpa, wound, t_s, travel, hum, p, e):
-    """Amplified voltage of the bridge, V; `hum` is a line of amplitude 1 in phase with the record."""
+    """Amplified voltage of the bridge, V. `hum` is a sine of amplitude 1 with the phase of the recorded hum."""
     r = resistance(length_mm, pressure_kpa, wound, t_s, travel, p, e)
     trimmed = p["beta"] * p["R0"] * (1.0 + p["e0"]) ** 2
     v = p["V_ref"] + p["G"] * p["V_exc"] * (0.5 - r / (r + trimmed))

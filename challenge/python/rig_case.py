@@ -1,12 +1,12 @@
-"""A case of the rig as a method sees it: 17 trials at 100 Hz, two stages that are fitted, 23 candidates.
+"""A case of the rig for a method: 17 trials at 100 Hz, two stages that are fitted, 23 candidates.
 
-What differs from the other plants:
+Differences from the other plants:
 
-- Noise is not given but estimated, and it is correlated: residuals are those of every seventh row, each less `rho` times the one before (AR(1)),
-  in units of what is usual. Both numbers come from what the re-tuned nominal rig leaves.
+- The noise is correlated, and is estimated. Residuals are computed from every seventh row: each minus `rho` times the previous one (an AR(1)
+  model), divided by its scale. `rho` and the scale are estimated from the residual of the re-tuned nominal rig.
 - Every second ramp is left out, which costs half the time.
-- Once the nominal rig is re-tuned, parameters are taken out to first order, still held by their tolerances: only arguments are searched for.
-- A record without pressure has one stage, from the openings to length and voltage.
+- After the nominal rig is re-tuned, parameters follow the effects to first order, with their tolerances as prior; only arguments are searched.
+- A recording without pressure has one stage, from the openings to length and voltage.
 """
 from pathlib import Path
 
@@ -23,7 +23,7 @@ PNEUMATIC = ("supply_sag", "valve_delay", "valve_deadband", "leak", "chamber_vol
 
 
 class RigCase(Case):
-    """As `Case`; stage 0 is the pneumatics, stage 1 muscle, gauge and reference."""
+    """As `Case`. Stage 0 is the pneumatics; stage 1 is muscle, gauge and reference."""
 
     def __init__(self, folder, plant, candidates):
         self.folder, self.plant, self.places, self.runs = Path(folder), plant, candidates, 0
@@ -108,7 +108,7 @@ class RigCase(Case):
         return tuple(np.array([x for k in tables for x in table[k].values()]) for table in (rig.PARAMETERS, rig.TOLERANCES))
 
     def centre(self, stage):
-        """Tolerances of the rig are wide: what stays after a fit is a tenth of them."""
+        """The tolerances of the rig are wide. After a fit, about a tenth of them remains as uncertainty."""
         return self.at_nominal(stage, self.fit)[0], 0.1 * self.nominal(stage)[1]
 
     def arguments(self, name):
@@ -118,7 +118,7 @@ class RigCase(Case):
         return name in rig.SIGNED
 
     def free(self, name):
-        """Numbers that a candidate brings; the phase of a hum is found in each trial."""
+        """Number of fitted numbers of a candidate. The phase of a hum is fitted in each trial."""
         return len(rig.ARGUMENTS[name]) + (len(self.fit) if name == "mains_hum" else 0)
 
     def measured(self, stage, trials):
@@ -136,7 +136,7 @@ class RigCase(Case):
         return self.body(p, effects, trials, [self.trials[i][1].pressure for i in trials])
 
     def pressures(self, p, effects, trials):
-        """Pressure of each trial, kPa; the last ones are kept, because most fits move something else."""
+        """Pressure of each trial, kPa. The last result is cached, because most steps of a fit change other values."""
         inside = np.array([effects[n][0] if n in effects else 0.0 for n in PNEUMATIC])
         key = (tuple(p), tuple(inside), tuple(trials))
         if key != self.last_pressure[0]:
@@ -149,7 +149,7 @@ class RigCase(Case):
         return self.last_pressure[1]
 
     def body(self, p, effects, trials, pressures):
-        """Length and voltage of each trial, from its pressure; the last lengths are kept."""
+        """Length and voltage of each trial, from its pressure. The last lengths are cached."""
         named = dict(zip(rig.PARAMETERS[1], p, strict=True))
         own = [(n, tuple(v)) for n, v in effects.items() if self.places[n] != "sensing"]
         key = (tuple(p[:5]), tuple(own), tuple(trials), self.last_pressure[0])
@@ -165,7 +165,7 @@ class RigCase(Case):
         return np.concatenate(out)
 
     def at_nominal(self, stage, trials):
-        """The re-tuned nominal rig: parameters, in tolerances, their slopes, and what turns a residual into parameters."""
+        """The re-tuned nominal rig: parameters, the same in tolerances, sensitivities, and the matrices of the least-squares solution."""
         key = (stage, tuple(trials))
         if key not in self.tuned:
             p0, tolerance = self.nominal(stage)
@@ -184,7 +184,7 @@ class RigCase(Case):
         return self.tuned[key]
 
     def left(self, stage, effects, trials):
-        """(parameters, residual with the prior) once parameters follow the effects to first order."""
+        """(parameters, residual with the prior) after parameters are re-tuned to first order."""
         p, z, slopes, solve, prior = self.at_nominal(stage, trials)
         gap = self.residual(stage, p, effects, trials)
         step = -(solve @ gap) - prior @ z
@@ -218,12 +218,12 @@ class RigCase(Case):
             left = self.left(stage, self.shared_out(names, off + (most - off) * np.asarray(x)[:count]), self.fit)[1]
             return float(left @ left)
 
-        spare = 1 if count == 1 else 0  # some optimisers want two at least
+        spare = 1 if count == 1 else 0  # some optimisers need at least two variables
         lowest = np.r_[self.least(names), np.zeros(spare)]
         return cost, 0.2 * np.ones(count + spare), lowest, np.ones(count + spare)
 
     def closed(self, names):
-        """Share of the gap of the test trials that these effects close: mean squares beyond the noise of second differences."""
+        """Share of the gap on the test trials that these effects close. The gap is the mean square beyond the noise from second differences."""
         before = after = 0.0
         for stage in self.stages:
             mine = [n for n in names if self.stage_of(n) == stage]

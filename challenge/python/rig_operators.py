@@ -1,4 +1,4 @@
-"""Signals that operators of the rig take and give, sampled at 100 Hz and drawn through their samples by straight lines."""
+"""Operators of the rig. Signals are sampled at 100 Hz and linear between samples."""
 import numpy as np
 
 from plant import njit
@@ -8,7 +8,7 @@ DT_S = 0.01
 
 @njit(cache=True)
 def lagged(x, tau_s, start):
-    """y' = (x - y)/tau, exact for x that goes straight between samples."""
+    """y' = (x - y)/tau, exact for x that is linear between samples."""
     out, y = np.empty_like(x), start
     if tau_s < 1e-6:
         return x.copy()
@@ -23,7 +23,7 @@ def lagged(x, tau_s, start):
 
 @njit(cache=True)
 def oscillated(x, m_s, damping):
-    """m^2 y'' + 2 damping m y' + y = x, from rest, exact for x that goes straight between samples."""
+    """m^2 y'' + 2 damping m y' + y = x, from rest, exact for x that is linear between samples."""
     if m_s < 1e-4:
         return x.copy()
     out, omega = np.empty_like(x), 1.0 / m_s
@@ -44,7 +44,7 @@ def oscillated(x, m_s, damping):
 
 @njit(cache=True)
 def played(x, width, wound):
-    """Backlash of a half width; `wound` is the position of x in it at first: 1 it went up before, -1 down, 0 in the middle."""
+    """Backlash of half-width `width`. `wound` is the initial state: 1 if x moved up before, -1 if it moved down, 0 in the middle."""
     out, y = np.empty_like(x), x[0] - wound * width
     for i in range(len(x)):
         y = min(max(y, x[i] - width), x[i] + width)
@@ -53,7 +53,7 @@ def played(x, width, wound):
 
 
 def hysteresis(x, share, scale, wound):
-    """Prandtl-Ishlinskii, three plays of radii up to `scale`."""
+    """Prandtl-Ishlinskii hysteresis: three plays with radii up to `scale`."""
     return x - share * sum(x - played(x, scale * r, wound) for r in (0.25, 0.5, 1.0)) / 3.0
 
 
@@ -62,22 +62,22 @@ def faded(x, share, tau_s):
 
 
 def elastic(x, least, knee):
-    """x that cannot fall below `least`, with a soft knee."""
+    """Limits x to at least `least`, with a soft knee."""
     return least + knee * np.logaddexp(0.0, (x - least) / knee)
 
 
 def limited(x, low, high, knee):
-    """x between two limits, with soft knees."""
+    """Limits x to a range, with soft knees."""
     x = low + knee * np.logaddexp(0.0, (x - low) / knee)
     return high - knee * np.logaddexp(0.0, (high - x) / knee)
 
 
 def late(x, delay_s):
-    """x of an earlier time; first and last value held."""
+    """Delays x; the first and the last value are held."""
     at = np.arange(len(x)) - delay_s / DT_S
     return np.interp(at, np.arange(len(x)), x)
 
 
 def travelled(x, ignored):
-    """How far x has gone up and down, turns within a band left out."""
+    """Distance that x has travelled up and down, without reversals within a band."""
     return np.concatenate([[0.0], np.cumsum(np.abs(np.diff(played(x, ignored, 0.0))))])

@@ -1,23 +1,23 @@
-"""A trial of the rig as recorded: on a grid of 100 Hz, with what a simulation needs in addition."""
+"""A recorded trial of the rig on a grid of 100 Hz, with the additional quantities that a simulation needs."""
 import numpy as np
 from scipy.signal import medfilt, savgol_filter
 
 import rig
 from rig_operators import played
 
-STRIDE = 7  # rows that are compared: 50 and 60 Hz stay visible in them
-GAP_S, AFTER_GAP_S = 0.035, 1.5  # commands of a gap are not known: rows in it and behind it are left out
-OUTLIER = 10.0  # times the noise from the median of five: left out
-MAD = 1.4826  # standard deviation of a normal variable over its median absolute deviation
+STRIDE = 7  # every seventh row is compared; 50 and 60 Hz remain visible
+GAP_S, AFTER_GAP_S = 0.035, 1.5  # commands in a gap are unknown: rows in it and after it are left out
+OUTLIER = 10.0  # samples farther than this from the median of five, in multiples of the noise, are replaced
+MAD = 1.4826  # standard deviation of a normal variable divided by its median absolute deviation
 
 
 def roughness(x):
-    """Noise from second differences, which what moves slowly hardly has."""
+    """Estimates the noise from second differences, in which slow motion is small."""
     return MAD * np.median(np.abs(np.diff(x, 2))) / np.sqrt(6.0)
 
 
 def table_of(path):
-    """Columns of a trial by name; empty cells are not a number."""
+    """Columns of a trial by name. Empty cells are NaN."""
     names = path.open().readline().strip().split(",")
     try:
         rows = np.loadtxt(path, delimiter=",", skiprows=1)
@@ -27,7 +27,7 @@ def table_of(path):
 
 
 class Trial:
-    """What was commanded and measured at 100 Hz; gaps led over, lone outliers replaced by the median of five."""
+    """Commands and measurements at 100 Hz. Gaps are interpolated, and isolated outliers are replaced by the median of five."""
 
     def __init__(self, path, start_s):
         rows = table_of(path)
@@ -38,7 +38,7 @@ class Trial:
         self.outputs = [self.cleaned(at, given, rows[c]) if c in rows else None for c in rig.OUTPUTS]
         pressure, length, _ = self.outputs
         self.length = np.ascontiguousarray(savgol_filter(length, 7, 2))
-        self.wound = 1.0 if np.median(length[:50]) < 165.0 else -1.0  # filled or emptied before
+        self.wound = 1.0 if np.median(length[:50]) < 165.0 else -1.0  # 1 if the chamber was filled before the trial, -1 if it was vented
         self.has_pressure = pressure is not None
         if self.has_pressure:
             self.pressure = np.ascontiguousarray(savgol_filter(pressure, 7, 2))
@@ -52,7 +52,7 @@ class Trial:
         rows, ends = np.arange(3, len(at), STRIDE), given[1:][np.diff(given) > GAP_S]
         unknown = [(at[rows] > end - np.diff(given).max()) & (at[rows] < end + AFTER_GAP_S) for end in ends]
         self.rows = rows[~np.any(unknown, axis=0)] if unknown else rows
-        self.travel = 0.0  # of the strain before this trial, set by the case
+        self.travel = 0.0  # travel of the strain before this trial; the case sets it
         self.hum = np.zeros(len(at))
 
     @staticmethod
@@ -63,7 +63,7 @@ class Trial:
         return np.where(np.abs(x - usual) > OUTLIER * max(roughness(x), 1e-9), usual, x)
 
     def line(self, hertz):
-        """Cosine and sine parts of a line in the voltage, from its second differences."""
+        """Amplitudes of cosine and sine of one frequency in the voltage, fitted to its second differences."""
         phase = 2.0 * np.pi * hertz * self.t_s[1]
         basis = np.stack([np.cos(phase), np.sin(phase)])
         rough = np.diff(self.outputs[2], 2) / (2.0 * np.cos(2.0 * np.pi * hertz * rig.DT_S) - 2.0)

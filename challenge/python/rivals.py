@@ -1,4 +1,4 @@
-"""Rivals on one set: `python3 rivals.py SET METHOD submission.json [cases]`. Each docstring says what was set, and by whom."""
+"""Methods for comparison, run on one set: `python3 rivals.py SET METHOD submission.json [cases]`. Each docstring states the settings."""
 import sys
 
 import numpy as np
@@ -8,7 +8,7 @@ from case import solve
 
 
 def named(case, believed):
-    """The answer with the greatest probability."""
+    """Returns the answer that follows from the most probable hypothesis."""
     names, _ = max(believed, key=lambda b: b[1])
     if names == ["unknown"]:
         return believed, "unknown", None, 0.0
@@ -18,7 +18,7 @@ def named(case, believed):
 
 
 def spread(case, names, confidence=0.9):
-    """A method without probabilities says 0.9 of what it names and spreads the rest over all other answers."""
+    """For a method without probabilities: gives 0.9 to the named effects, and divides the rest among all other answers."""
     answers = [[], ["unknown"], *([name] for name in case.places)]
     others = [a for a in answers if a != sorted(names)]
     rest = (1.0 - confidence) / len(others)
@@ -26,7 +26,7 @@ def spread(case, names, confidence=0.9):
 
 
 def singles(case):
-    """Sum of squares of the fit, extra arguments and samples of nothing and of each single effect, over both stages."""
+    """For no effect and each single effect: sum of squares of the fit over both stages, and number of additional arguments. Also the samples."""
     plain = [case.retune(stage)[2] for stage in case.stages]
     samples = sum(len(case.measured(stage, case.fit)) for stage in case.stages)
     table = {(): (sum(plain), 0)}
@@ -37,7 +37,7 @@ def singles(case):
 
 
 def weighed(table, samples):
-    """exp(-BIC/2), normalised; the noise is known, so that BIC = chi-square + k ln n."""
+    """Normalised exp(-BIC/2). The noise is known, so BIC = chi-square + k ln n."""
     bic = {names: chi + k * np.log(samples) for names, (chi, k) in table.items()}
     least = min(bic.values())
     weights = {names: np.exp(-0.5 * min(b - least, 400.0)) for names, b in bic.items()}
@@ -79,7 +79,7 @@ def forward(case):
 
 
 def signatures(case, stage):
-    """What each candidate and each parameter of a stage changes, in units of the noise, at the re-tuned nominal."""
+    """Changes of a stage's output by each candidate and each parameter, in multiples of the noise, around the re-tuned nominal simulator."""
     p, _, _ = case.retune(stage)
     plain = case.simulate(stage, p, {}, case.fit)
     columns, names = [], []

@@ -1,4 +1,4 @@
-"""The nominal simulator of the servo, as plain Python: NumPy, and numba where it is installed, much faster."""
+"""The nominal simulator of the servo in Python: NumPy, and numba if it is installed, which is much faster."""
 import numpy as np
 
 from plant import njit
@@ -6,10 +6,10 @@ from plant import njit
 NAME, DT_S, INPUT, OUTPUTS = "servo", 0.01, "command_V", ("speed_rad_s", "load_rad")
 STAGES = ("motor", "gear")
 NOISE = (0.3, 0.01)
-SPAN = (-6.0, 6.0)  # of the input
+SPAN = (-6.0, 6.0)  # range of the input
 PARAMETERS = {"gain": 20.0, "tau": 0.1, "ratio": 20.0, "soft": 0.05}
 TOLERANCES = {"gain": 1.0, "tau": 0.01, "ratio": 0.2, "soft": 0.005}
-EFFECTS = ("friction", "drag")  # the simulator has these itself; 0 is off
+EFFECTS = ("friction", "drag")  # effects that the simulator implements; 0 is off
 SUBSTEPS = 4
 
 
@@ -27,7 +27,7 @@ def motor(u, p, effects):
 
 @njit(cache=True)
 def gear(w, p, effects):
-    """angle' = w/ratio, load' = (angle - load)/soft, w drawn through its samples by straight lines."""
+    """angle' = w/ratio, load' = (angle - load)/soft, w linear between samples."""
     out, angle, load, step = np.empty_like(w), 0.0, 0.0, DT_S / SUBSTEPS
     for i in range(len(w)):
         out[i] = load

@@ -1,10 +1,10 @@
-"""A rival that learns from simulations of a case: ABC by a random forest."""
+"""A method for comparison that is trained on simulations of a case: approximate Bayesian computation (ABC) by a random forest."""
 import numpy as np
 
 from rivals import named, signatures
 
-DRAWS = {"rig": 15}  # simulations of nothing and of each single effect, for a case
-PAIRS = {"rig": 75}  # of pairs of effects
+DRAWS = {"rig": 15}  # number of simulations per case without an effect and of each single effect
+PAIRS = {"rig": 75}  # number of simulations of pairs of effects
 
 
 def hypotheses(case):
@@ -14,7 +14,7 @@ def hypotheses(case):
 
 
 def drawn(case, hypothesis, random):
-    """Both outputs of the fit trials: parameters from their tolerances, arguments denser near off."""
+    """Simulates both outputs of the fit trials. Parameters are drawn within their tolerances, arguments more often near their off values."""
     effects = {}
     for name in hypothesis:
         triples = case.arguments(name)
@@ -33,7 +33,7 @@ def drawn(case, hypothesis, random):
 
 
 class Summary:
-    """Of the residual of each stage, parameters taken out: its size and its likeness with every signature."""
+    """Summary statistics of each stage's residual after parameters are projected out: its size, and its correlation with every signature."""
 
     def __init__(self, case):
         self.case, self.tools = case, []
@@ -60,7 +60,7 @@ class Summary:
 
 
 def table(case, random, draws, pairs):
-    """(summaries, hypothesis numbers, hypotheses) of simulations of a case."""
+    """(summary statistics, indices of hypotheses, hypotheses) of simulations of a case, and the summary statistics of the case."""
     all_of, summary = hypotheses(case), Summary(case)
     one = [i for i, h in enumerate(all_of) if len(h) < 2]
     two = [i for i, h in enumerate(all_of) if len(h) == 2]

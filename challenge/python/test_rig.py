@@ -1,6 +1,6 @@
-"""The rig in Python against an independent implementation's vectors, nominal and with each effect alone: `python3 test_rig.py`.
+"""Compares the rig in Python with the vectors of an independent implementation, nominal and with each effect alone: `python3 test_rig.py`.
 
-Tolerances are shares of full scale (620 kPa, 50 mm, 3.3 V): steps of 10 ms where the vectors have 0.25 ms.
+The tolerance is a share of full scale (620 kPa, 50 mm, 3.3 V). The rig here has steps of 10 ms, the vectors were computed with 0.25 ms.
 """
 import csv
 from pathlib import Path
@@ -11,7 +11,7 @@ import rig
 
 VECTORS = Path(__file__).parents[2] / "reference" / "rig"
 SCALE = {"pressure_kpa": 620.0, "length_mm": 50.0, "bridge_v": 3.3}
-TOLERANCE = 5e-4  # of full scale, root mean square: a fifth of the noise of a channel or less
+TOLERANCE = 5e-4  # root mean square, as a share of full scale: at most a fifth of the noise of a channel
 LINE_HZ = 60.0
 
 
@@ -27,7 +27,7 @@ def commands(name, samples):
 
 
 def simulated(inlet, outlet, start_kpa, effects):
-    """The three channels, one after the other; the volume follows the length that comes of it, found by going round."""
+    """Simulates the three channels one after the other. A volume that depends on the length is found by fixed-point iteration."""
     first = np.array(list(rig.PARAMETERS[0].values()))
     inside = [effects.get(n, [0.0])[0] for n in ("supply_sag", "valve_delay", "valve_deadband", "leak", "chamber_volume")]
     p, t = rig.PARAMETERS[1], np.arange(len(inlet)) * rig.DT_S

@@ -1,4 +1,4 @@
-"""The nominal simulator of the heated block, as plain Python: NumPy, and numba where it is installed."""
+"""The nominal simulator of the heated block in Python: NumPy, and numba if it is installed."""
 import numpy as np
 
 from plant import njit
@@ -6,10 +6,10 @@ from plant import njit
 NAME, DT_S, INPUT, OUTPUTS = "thermal", 2.0, "heater_W", ("block_degC", "probe_degC")
 STAGES = ("block", "probe")
 NOISE = (0.1, 0.1)
-SPAN = (0.0, 60.0)  # of the input
+SPAN = (0.0, 60.0)  # range of the input
 PARAMETERS = {"capacity": 120.0, "loss": 0.8, "probe_tau": 12.0}
 TOLERANCES = {"capacity": 6.0, "loss": 0.08, "probe_tau": 1.2}
-EFFECTS = ("radiation", "fan")  # the simulator has these itself; 0 is off
+EFFECTS = ("radiation", "fan")  # effects that the simulator implements; 0 is off
 SUBSTEPS = 4
 
 
@@ -28,7 +28,7 @@ def block(power, p, effects):
 
 @njit(cache=True)
 def probe(t, p, effects):
-    """probe' = (T - probe)/tau, T drawn through its samples by straight lines."""
+    """probe' = (T - probe)/tau, T linear between samples."""
     out, y, step = np.empty_like(t), 20.0, DT_S / SUBSTEPS
     for i in range(len(t)):
         out[i] = y

@@ -1,4 +1,4 @@
-"""A plant of the challenge as a worker of stretch: `python3 worker.py servo`. The protocol is in book/src/reference/worker.md."""
+"""Runs a plant of the challenge as a worker of stretch: `python3 worker.py servo`. book/src/reference/worker.md describes the protocol."""
 import importlib
 import json
 import struct
@@ -8,13 +8,13 @@ import numpy as np
 
 PLANT = importlib.import_module(sys.argv[1])
 SOURCE, SINK = sys.stdin.buffer, sys.stdout.buffer
-sys.stdout = sys.stderr  # whatever is printed must not get between the frames
+sys.stdout = sys.stderr  # printed text must not mix with the frames
 
 
 def receive():
     prefix = SOURCE.read(16)
     if len(prefix) < 16:
-        sys.exit(0)  # the other side is gone
+        sys.exit(0)  # the other side has closed the stream
     header, body = struct.unpack("<4xIQ", prefix)
     return json.loads(SOURCE.read(header)), np.frombuffer(SOURCE.read(body), "<f8")
 
@@ -26,7 +26,7 @@ def send(header, body=b""):
 
 
 def simulated(stage, parameters, effects, drive, trials):
-    """The output of a stage over these trials, each from rest."""
+    """Output of a stage over these trials. Each trial starts at rest."""
     p = np.array([parameters.get(name, value) for name, value in PLANT.PARAMETERS.items()])
     e = np.array([effects.get(name, 0.0) for name in PLANT.EFFECTS])
     out, first = [], 0

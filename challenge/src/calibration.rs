@@ -1,13 +1,14 @@
-//! Calibration of the posterior: the thresholds under which the sealed truths are most likely.
+//! Calibrates the posterior: finds the thresholds for which the sealed labels are most likely.
 //!
-//! A diagnosis lists every hypothesis with its score and what it leaves, so its probabilities under
-//! other thresholds are known without another diagnosis. The mean of ln P(truth) over labelled
-//! cases is maximised one threshold at a time. Nothing, one effect, two, and causes outside the
-//! catalogue have the same weight, whatever their number of cases, except that nothing has three
-//! times the weight, because a false alarm costs more than a cause that is overlooked. The
-//! calibrated thresholds are those that separate the catalogue from something else. The temperature
-//! and the softness of that border stay, because they were calibrated on more cases and seeds than
-//! one run has. A border as sharp as one generator's forms would be too sure of another's.
+//! A diagnosis lists every hypothesis with its score and the gap that it leaves. Its probabilities
+//! for other thresholds can therefore be computed without another diagnosis. The mean of ln
+//! P(truth) over labelled cases is maximised one threshold at a time. The kinds of cases (one
+//! effect, two effects, a cause outside the catalogue) have equal weights, whatever their numbers
+//! of cases. Cases without an effect have three times this weight, because a false alarm is worse
+//! than an overlooked cause. The calibrated thresholds separate causes in the catalogue from causes
+//! outside it. The temperature and the softness of this border do not change, because they were
+//! calibrated on more cases and seeds than one run has. If the softness were fitted to the forms of
+//! one generator, the probabilities would be too certain for others.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -15,12 +16,12 @@ use stretch_blind::{COUNTED_EXCESS, CaseKind, Label, are_twins};
 use stretch_data::significant;
 use stretch_gap::{Candidate, Diagnosis, Thresholds, VerdictKind};
 
-/// Probability of a truth that is no candidate.
+/// Probability of a true hypothesis that is not among the candidates.
 const NOT_LISTED: f64 = 1e-3;
-/// Weight of a null relative to the other kinds.
+/// Weight of cases without an effect, relative to the other kinds.
 const NULL: f64 = 3.0;
-/// Factors by which a threshold is multiplied in turn, the finest last, and rounds over all
-/// thresholds with each.
+/// Factors by which a threshold is multiplied or divided, and the number of rounds over all
+/// thresholds with each factor.
 const FACTORS: [f64; 3] = [2.0, 1.3, 1.1];
 const ROUNDS: usize = 8;
 
@@ -28,10 +29,11 @@ const ROUNDS: usize = 8;
 const CALIBRATED: [fn(&mut Thresholds) -> &mut f64; 3] =
     [|t| &mut t.unknown_excess, |t| &mut t.unknown_share, |t| &mut t.unknown_odds];
 
-/// A label, and what the diagnosis said of its case.
+/// A label, and the diagnosis of the case.
 pub type Case = (Label, Diagnosis);
 
-/// Calibrates thresholds on labelled cases that were diagnosed; those that control the search stay.
+/// Calibrates thresholds on diagnosed cases with labels. Thresholds that control the search do not
+/// change.
 pub fn calibrated(cases: &[&Case]) -> Thresholds {
     let mut kinds: BTreeMap<CaseKind, Vec<(&Diagnosis, Vec<usize>)>> = BTreeMap::new();
     for (label, diagnosis) in cases.iter().filter(|(label, d)| is_counted(label, d)) {
@@ -78,14 +80,14 @@ pub fn calibrated(cases: &[&Case]) -> Thresholds {
     best
 }
 
-/// Whether a case contributes: its cause is visible and is one set of effects, and the record is
-/// not wrong.
+/// Whether a case is used: its cause is visible and is one set of effects, and the diagnosis did
+/// not find an error of the recording.
 fn is_counted(label: &Label, diagnosis: &Diagnosis) -> bool {
     let shows = label.kind == CaseKind::Null || label.excess >= COUNTED_EXCESS;
     shows && label.kind != CaseKind::Dominant && diagnosis.verdict() != VerdictKind::Record
 }
 
-/// Indices of the candidates that are the truth; empty if it is not listed.
+/// Returns the indices of the true candidates; empty if none is listed.
 fn truth(label: &Label, diagnosis: &Diagnosis) -> Vec<usize> {
     let named: BTreeSet<&String> = label.effects.iter().collect();
     let is_twin = |c: &Candidate| {

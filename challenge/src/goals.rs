@@ -1,25 +1,26 @@
-//! What a blind check is meant to reach.
+//! The goals of a blind check.
 
 use serde::Serialize;
 use stretch_blind::{Rate, Score};
 
-/// A figure, its goal, and whether it is reached.
+/// A statistic, its goal, and whether the goal is reached.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Goal {
-    /// What is counted.
+    /// Name of the statistic.
     pub what: &'static str,
     /// The goal in words.
     pub goal: String,
-    /// What was reached.
+    /// Value of the statistic.
     pub value: Option<f64>,
-    /// Hits and cases, where it is a rate.
+    /// Hits and cases, if the statistic is a rate.
     pub rate: Option<Rate>,
-    /// Whether the goal is reached; `None` without a case, or if a single case decides.
+    /// Whether the goal is reached; `None` if there are no cases, or so few that a single case
+    /// would decide.
     pub met: Option<bool>,
 }
 
 impl Goal {
-    /// Whether it is reached, in one word; if a single case decides, there are too few to say.
+    /// Returns the result in words: `yes`, `no`, or `too few` if a single case would decide.
     pub fn verdict(&self) -> &'static str {
         match (self.met, self.value) {
             (Some(true), _) => "yes",
@@ -29,8 +30,7 @@ impl Goal {
         }
     }
 
-    /// Its row of the table: what is counted, the goal, what was reached, the count, Wilson's
-    /// interval, whether the goal is met.
+    /// Returns the row of the table: statistic, goal, value, count, Wilson interval, and result.
     pub fn cells(&self) -> [String; 6] {
         let interval = self.rate.and_then(|rate| rate.wilson());
         [
@@ -44,14 +44,14 @@ impl Goal {
     }
 }
 
-/// Whether this many cases, of which some missed, are enough for a goal that lets a share of them
-/// miss: one may miss, or more than one did.
+/// Whether the number of cases is sufficient for a goal that allows the share `may_miss` of errors:
+/// the goal allows at least one error, or more than one occurred.
 fn is_telling(cases: usize, missed: usize, may_miss: f64) -> bool {
-    // a share of 1 - 0.95 is a little less than a twentieth
+    // in floating point, 1 - 0.95 is slightly less than 1/20
     may_miss * cases as f64 >= 1.0 - 1e-9 || missed > 1
 }
 
-/// The goals of a blind check, and its results.
+/// Returns the goals of a blind check with the results.
 pub fn goals(score: &Score) -> Vec<Goal> {
     let s = &score.singles;
     let goal = |what, sign: &str, bound: f64, value: Option<f64>, rate: Option<Rate>| {

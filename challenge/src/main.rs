@@ -1,4 +1,5 @@
-//! `challenge`: does the diagnosis name causes that were sealed before it ran?
+//! The program `challenge`, which tests whether a diagnosis names causes that were sealed before it
+//! ran.
 
 use std::{path::PathBuf, process::ExitCode};
 
@@ -52,19 +53,19 @@ enum Step {
         /// Folder with the cases and their answers, or a submission.json
         #[arg(value_name = "DIR|submission.json")]
         folder: PathBuf,
-        /// Set that a submission answers; its labels lie in DIR-sealed
+        /// Set of the submission; its labels are in DIR-sealed
         #[arg(long, value_name = "DIR", default_value = "set")]
         set: PathBuf,
-        /// Record of the seeds whose labels were opened
+        /// File with the seeds whose labels were opened
         #[arg(long, value_name = "FILE", default_value = SPENT)]
         spent: PathBuf,
-        /// Score the first N cases of a set alone, for a submission that was not finished
+        /// Score only the first N cases of a set, for a submission that is not complete
         #[arg(long, value_name = "N")]
         first: Option<usize>,
     },
     /// Write the leaderboard of scores
     Board {
-        /// What `challenge score submission.json` wrote
+        /// Scores that `challenge score submission.json` wrote
         #[arg(value_name = "FILE.score.json", required = true)]
         scores: Vec<PathBuf>,
         /// The page
@@ -76,39 +77,39 @@ enum Step {
     Diagnose(Asked),
 }
 
-/// What is made, and where.
+/// Arguments of the command that makes cases.
 #[derive(clap::Args)]
 struct Make {
-    /// How many cases: single effects, none, several, causes outside the catalogue and effects
+    /// Number of cases: single effects, none, several, causes outside the catalogue, and effects
     /// whose entry is removed
     #[arg(long, value_name = "N", value_parser = count)]
     cases: usize,
     /// Seed; those below 1000000 are for development
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
-    /// Folder that the cases go to; it must not hold anything
+    /// Folder for the cases; it must be empty
     #[arg(long, value_name = "DIR", default_value = "challenge-check")]
     out: PathBuf,
-    /// Family that the forms are drawn from: written, splines, spectra, rate_laws or asymmetric
+    /// Family from which the forms are drawn: written, splines, spectra, rate_laws or asymmetric
     /// [default: all of them in turn]
     #[arg(long, value_name = "NAME")]
     family: Option<Family>,
-    /// Make a set that strangers solve, of this plant: rig, servo or thermal; its labels go to
+    /// Make an open set for other methods, of this plant: rig, servo or thermal; its labels go to
     /// DIR-sealed
     #[arg(long, value_name = "NAME")]
     plant: Option<PlantName>,
-    /// Family of forms and noise in addition to the published ones, a JSON file that is kept back
+    /// Family of forms and noise in addition to the published ones: a JSON file that is not published
     #[arg(long, value_name = "FILE.json", requires = "plant")]
     private: Option<PathBuf>,
-    /// Record of the seeds whose labels were opened, none of which is made again
+    /// File with the seeds whose labels were opened; these seeds are refused
     #[arg(long, value_name = "FILE", default_value = SPENT)]
     spent: PathBuf,
 }
 
-/// Record of the seeds that are spent, in the folder that the program runs in.
+/// File with the spent seeds, in the working folder.
 const SPENT: &str = "spent_seeds.csv";
 
-/// Largest number of cases: a case is a megabyte or two, so that these fill a disk.
+/// Largest number of cases. A case needs one to two megabytes, so this number fills a disk.
 const MOST_CASES: usize = 100_000;
 
 fn count(text: &str) -> Result<usize, String> {

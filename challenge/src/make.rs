@@ -1,4 +1,4 @@
-//! Cases in a new folder, and the seeds of sets whose labels have been opened.
+//! Makes cases in a new folder, and records the seeds of sets whose labels were opened.
 
 use std::{fs, path::Path};
 
@@ -9,8 +9,8 @@ use stretch_data::files::{write_folder, write_whole};
 
 use crate::text::progress;
 
-/// Makes the cases of a plan in an empty folder, completely or not at all, so that a person who
-/// opened a seal cannot get another one under its name.
+/// Makes the cases of a plan in an empty folder, completely or not at all. Existing cases are never
+/// replaced, so labels that were opened cannot be exchanged for others in the same folder.
 ///
 /// # Errors
 /// A folder that is not empty, a plan without a case, a file that cannot be written.
@@ -53,14 +53,14 @@ pub fn make_open(
         })
     });
     if made.is_err() && hash.is_some() {
-        // labels have their name, their cases do not
+        // the labels are already in their folder, but the cases could not be made
         let _ = fs::remove_dir_all(&sealed);
     }
     made?;
     hash.context("no set was made")
 }
 
-/// A seed whose labels have been opened: a row of the record of them.
+/// A seed whose labels were opened: a row of the file of spent seeds.
 #[derive(Debug, Serialize, Deserialize)]
 struct SpentSeed {
     plant: String,
@@ -78,7 +78,7 @@ fn spent_seeds(path: &Path) -> anyhow::Result<Vec<SpentSeed>> {
     rows.with_context(|| path.display().to_string())
 }
 
-/// Adds the seed of a set to the record, if it is not there.
+/// Adds the seed of a set to the file of spent seeds, unless it is there already.
 pub(crate) fn record_spent(path: &Path, score: &OpenScore) -> anyhow::Result<()> {
     let mut spent = spent_seeds(path)?;
     if spent.iter().any(|s| s.plant == score.plant && s.seed == score.seed) {

@@ -1,4 +1,4 @@
-//! Submissions to sets that strangers solve: their scores, and the leaderboard, a page of one file.
+//! Scores submissions to open sets, and writes the leaderboard, a page of one file.
 
 use std::{
     collections::BTreeMap,
@@ -14,9 +14,9 @@ use stretch_report::kit::{Figure, Page, Table};
 
 use crate::{make::record_spent, page::reliability_figure, text::table};
 
-/// Scores a submission against the set next to whose labels it was made, writes
-/// `SUBMISSION.score.json`, and records the seed. `first` limits the set and the submission to that
-/// many of the first cases.
+/// Scores a submission against a set and its labels, writes `SUBMISSION.score.json`, and records
+/// the seed as spent. `first` limits the set and the submission to that number of cases, from the
+/// first.
 ///
 /// # Errors
 /// A submission that cannot be read or uses names that the set does not have, a broken seal.
@@ -47,7 +47,7 @@ pub fn score_open(
     Ok(format!("seal intact, SHA-256 {hash}\n\n{rows}\nwrote {}", path.display()))
 }
 
-/// A figure with its interval, or a dash where no case counts.
+/// Formats a statistic with its interval; a dash if no case counts.
 fn cell(figure: &Interval) -> String {
     let Interval { value, low, high, count } = *figure;
     let Some(value) = value else { return "-".to_owned() };
@@ -60,14 +60,15 @@ fn read_json<T: DeserializeOwned>(path: &Path) -> anyhow::Result<T> {
     serde_json::from_str(&text).with_context(|| path.display().to_string())
 }
 
-/// The page of scores: a row for each method and plant, a row for each method over all its plants, and reliability diagrams.
-/// Rows of a plant are in the order of the exact answers.
+/// Returns the page of scores: a row for each method and plant, a row for each method over all its plants, and
+/// reliability diagrams. The rows of a plant are sorted by the share of exact answers.
 ///
-/// Methods over several plants are compared only if each was asked the same cases; the page states
-/// the sets of each row.
+/// Results of methods over several plants are comparable only if all methods answered the same
+/// cases. The page lists the sets.
 ///
 /// # Errors
-/// A file that cannot be read or is no score, no score, or two of one method on one set.
+/// A file that cannot be read or is not a score, an empty list, or two scores of one method on one
+/// set.
 pub fn board(paths: &[PathBuf]) -> anyhow::Result<String> {
     let scores = paths.iter().map(|path| read_json(path));
     let scores: Vec<OpenScore> = scores.collect::<anyhow::Result<_>>()?;
@@ -87,7 +88,7 @@ pub fn board(paths: &[PathBuf]) -> anyhow::Result<String> {
         .into_iter()
         .map(|((plant, method), cases)| (plant, method, Figures::of(&cases)))
         .collect();
-    // the first figure is the share of exact answers
+    // the first statistic is the share of exact answers
     let exact = |figures: &Figures| figures.rows[0].1.value.unwrap_or(0.0);
     figures.sort_by(|a, b| a.0.cmp(&b.0).then(exact(&b.2).total_cmp(&exact(&a.2))));
     let mut page = Page::new(

@@ -1,5 +1,4 @@
-//! The report of a blind check: how often the diagnosis was right, and every case in which it was
-//! not.
+//! The report of a blind check: the rates of right answers, and every case with a wrong answer.
 
 use plotters::{
     prelude::*,
@@ -13,11 +12,11 @@ use stretch_report::kit::{
 
 use crate::{goals::Goal, score::Answers};
 
-/// Ends of the classes of strength.
+/// Boundaries of the classes of strength.
 const STRENGTHS: [f64; 8] = [0.05, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
 
-/// The report as one HTML file: every figure, the labels, their seal, and what was answered, and what was reached of
-/// the goals.
+/// Returns the report as one HTML file: all statistics, the hash of the labels, the wrong answers, and the goals
+/// with their results.
 pub(crate) fn page(score: &Score, answers: &Answers, reached: &[Goal]) -> String {
     let mut page = Page::new("Blind check of the diagnosis", &sentence(score));
     goals(&mut page, &answers.sha256, reached);
@@ -124,14 +123,15 @@ fn probabilities(page: &mut Page, score: &Score) {
     );
 }
 
-/// Stated probability against how often it came true, with Wilson's interval.
+/// Draws the reliability diagram: the rate of right answers against the stated probability, with
+/// Wilson intervals.
 pub(crate) fn reliability_figure(calibration: &Calibration) -> Figure {
     let bins: Vec<_> = calibration.bins.iter().filter(|b| b.right.cases > 0).collect();
     if bins.is_empty() {
         return Figure::missing("No probability was stated.");
     }
     let labels = ["probability stated", "share that came true (below: number of cases)"];
-    // below the axis of no case there is room for the counts: none of them lies on a point
+    // the counts are drawn below zero, where they cover no point
     let axes = Axes::new(0.0..1.0, -0.13..1.0, labels);
     Figure::new("Reliability diagram: probability stated against share that came true").draw(
         FigureSize::NARROW,

@@ -1,4 +1,4 @@
-//! Diagnoses every case in a process and a folder that hold no label.
+//! Diagnoses every case in a separate process and folder that contain no labels.
 
 use std::{
     fs, iter,
@@ -24,45 +24,45 @@ use crate::{
     text::progress,
 };
 
-/// Why there is no answer.
+/// File with the reason why there is no answer.
 const REFUSAL: &str = "refusal.txt";
-/// What the diagnosis may know in addition to the data.
+/// File with information that the diagnosis may use in addition to the data.
 const HINT: &str = "hint.toml";
 
-/// How the cases are diagnosed.
+/// Options of the diagnosis of cases.
 #[derive(Debug, Clone, clap::Args)]
 pub struct RunOptions {
-    /// Cases diagnosed at a time [default: one a core]
+    /// Number of cases that are diagnosed at the same time [default: one per core]
     #[arg(long, value_name = "N")]
     pub jobs: Option<usize>,
-    /// Answer again where there is an answer
+    /// Diagnose cases again that have an answer
     #[arg(long)]
     pub again: bool,
-    /// Program that is asked in place of this one, as `PROGRAM diagnose . --json=diagnosis.json --no-next`,
-    /// with --without EFFECT behind it; `stretch` is one
+    /// Program that diagnoses the cases in place of this one, called as `PROGRAM diagnose . --json=diagnosis.json
+    /// --no-next`, with --without EFFECT added if an effect is left out; `stretch` is such a program
     #[arg(long, value_name = "PROGRAM")]
     pub program: Option<PathBuf>,
 }
 
-/// Whether case folders may exist, which are removed after a Ctrl-C.
+/// Whether temporary folders of cases may exist, which a Ctrl-C has to remove.
 static RUNNING: AtomicBool = AtomicBool::new(false);
 static STOPPED: AtomicBool = AtomicBool::new(false);
 
-/// Handler of Ctrl-C: while cases are diagnosed the first one removes their folders, any other ends
-/// the program.
+/// Handles Ctrl-C. While cases are diagnosed, the first Ctrl-C requests a stop that removes their
+/// folders. Any other ends the program at once.
 pub fn on_ctrl_c() {
     if STOPPED.swap(true, SeqCst) || !RUNNING.load(SeqCst) {
         clean_up_and_exit(130);
     }
 }
 
-/// Whether Ctrl-C asked to stop.
+/// Whether a stop was requested by Ctrl-C.
 pub fn is_stopped() -> bool {
     STOPPED.load(SeqCst)
 }
 
-/// Diagnoses every case of a folder that has no answer yet; returns how many are answered, of how
-/// many.
+/// Diagnoses every case of a folder that has no answer yet. Returns the number of cases with an
+/// answer, and the number of all cases.
 ///
 /// # Errors
 /// Labels that are not sealed, an interrupted diagnosis, Ctrl-C.
@@ -111,14 +111,14 @@ fn answer(program: &Path, case: &Path, is_alone: bool) -> anyhow::Result<()> {
     } else {
         let why = String::from_utf8_lossy(&output.stderr).into_owned();
         ensure!(output.status.code() == Some(1), "the diagnosis broke off: {why}");
-        // a refusal is an answer, too: it is scored as none
+        // a refusal is stored, too: it is scored as a case without an answer
         (REFUSAL, why)
     };
     room.close()?;
     Ok(write_whole(case.join(file), |out| out.write_all(text.as_bytes()))?)
 }
 
-/// Effects that a case's `hint.toml` takes out of the catalogue.
+/// Returns the effects that the `hint.toml` of a case removes from the catalogue.
 fn without(case: &Path) -> anyhow::Result<Vec<String>> {
     #[derive(serde::Deserialize)]
     struct Hint {
@@ -136,16 +136,16 @@ fn without(case: &Path) -> anyhow::Result<Vec<String>> {
 
 /// A copy of one case's data in a new temporary folder, which is removed on drop.
 ///
-/// The diagnosing process works in it: neither its working folder nor an argument nor its
-/// environment leads to the labels. A program that searched for them could still find them, as any
-/// program of the same user could.
+/// The diagnosing process works in this folder. Its working folder, its arguments and its
+/// environment do not name the folder of the labels. A program that searched the disk could still
+/// find the labels, because it runs as the same user.
 struct Room {
     dir: TempDir,
     folder: PathBuf,
 }
 
 impl Room {
-    /// Copies a case's data.
+    /// Copies the data of a case.
     fn of(case: &Path) -> anyhow::Result<Self> {
         let dir = TempDir::with_prefix("stretch-").context("temporary folder")?;
         let name = case.file_name().map_or_else(|| "case".into(), ToOwned::to_owned);
@@ -155,7 +155,7 @@ impl Room {
             for entry in fs::read_dir(case)? {
                 let entry = entry?;
                 let name = entry.file_name();
-                // A link might lead out of the case.
+                // Links are not copied, because they may point to files outside the case.
                 if entry.file_type()?.is_file()
                     && ![ANSWER, REFUSAL, HINT].iter().any(|w| name == *w)
                 {
@@ -168,31 +168,31 @@ impl Room {
         Ok(Self { dir, folder })
     }
 
-    /// A command that runs in the folder and knows of no other.
+    /// Returns a command that runs in the folder, and whose environment names no other folder.
     fn command(&self, program: &Path) -> Command {
         let mut command = Command::new(program);
         command.current_dir(&self.folder).env("PWD", &self.folder).env_remove("OLDPWD");
-        // The shell's record of the last command, which contains the folder's name.
+        // The shell stores the last command in this variable, with the name of the folder.
         command.env_remove("_");
         command
     }
 
-    /// A file that was written there.
+    /// Reads a file that the program wrote into the folder.
     fn read(&self, file: &str) -> anyhow::Result<String> {
         let path = self.folder.join(file);
         fs::read_to_string(&path).with_context(|| path.display().to_string())
     }
 
-    /// Takes the folder away, and says why not.
+    /// Removes the folder, and returns an error if this fails.
     fn close(self) -> anyhow::Result<()> {
         let shown = self.dir.path().display().to_string();
         self.dir.close().with_context(|| format!("{shown}: it cannot be removed"))
     }
 }
 
-/// The results of `count` jobs, in order, by so many threads. These are not rayon's threads,
-/// because a diagnosis has its own pool, and a waiting rayon worker would begin the next job inside
-/// the first.
+/// Runs `count` jobs on `threads` threads and returns their results in order. These are not threads
+/// of rayon, because a diagnosis has its own pool, and a waiting rayon worker would begin the next
+/// job inside the first.
 ///
 /// # Errors
 /// The error of the first failed job, in order; no job begins after one has failed.
@@ -229,7 +229,7 @@ pub fn shared_out<T: Send>(
     done.into_iter().map(|(_, result)| result).collect()
 }
 
-/// What a diagnosis is asked.
+/// Arguments of the command that diagnoses one folder.
 #[derive(Debug, Clone, clap::Args)]
 pub struct Asked {
     folder: PathBuf,
@@ -243,7 +243,7 @@ pub struct Asked {
     no_next: bool,
 }
 
-/// Diagnoses the data set of a folder as `stretch diagnose FOLDER` does, and writes its JSON.
+/// Diagnoses the data set of a folder as `stretch diagnose FOLDER` does, and writes the JSON.
 ///
 /// # Errors
 /// Data that the diagnosis refuses, a file that cannot be written.
@@ -255,11 +255,10 @@ pub fn write_diagnosis(asked: &Asked) -> anyhow::Result<()> {
     Ok(write_whole(&asked.json, |out| out.write_all(text.as_bytes()))?)
 }
 
-/// The diagnosis of a case in this process, by an engine with the given options: for tools that
-/// know the label.
+/// Diagnoses a case in this process with the given options. For tools that may read the label.
 ///
 /// # Errors
-/// Data that the diagnosis refuses, an effect to strike out that there is none.
+/// Data that the diagnosis refuses, or a removed effect that does not exist.
 pub fn diagnosed(
     folder: &Path,
     without: &[impl AsRef<str>],
@@ -295,7 +294,7 @@ mod tests {
             names
         };
         assert_eq!(listed(&room.folder), ["a.csv", "dataset.toml"]);
-        // The case is the only entry of its folder, and no parent folder belongs to the check.
+        // The folder contains only the case, and no parent folder belongs to the check.
         let above = room.folder.parent().unwrap();
         assert_eq!(listed(above), ["case-000"]);
         assert!(!room.folder.starts_with(check.path()));

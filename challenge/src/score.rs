@@ -1,4 +1,4 @@
-//! Opens the seal: compares answers with labels and goals.
+//! Opens the labels, and compares the answers with labels and goals.
 
 use std::{
     fs,
@@ -15,17 +15,17 @@ use crate::{
     text::table,
 };
 
-/// The answer in a case's folder.
+/// File of the answer in the folder of a case.
 pub const ANSWER: &str = "diagnosis.json";
 
-/// What is scored.
+/// The answers with their labels.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Answers {
-    /// SHA-256 of the labels, as sealed.
+    /// SHA-256 of the labels.
     pub sha256: String,
     /// The labels.
     pub truth: Truth,
-    /// What was answered; a case that was refused has none.
+    /// Verdicts of all cases that have an answer.
     pub verdicts: Vec<Verdict>,
 }
 

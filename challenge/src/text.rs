@@ -13,7 +13,7 @@ pub fn say(text: impl Display) {
     let _ = writeln!(stdout(), "{text}");
 }
 
-/// A bar on standard error, only on a terminal.
+/// Returns a progress bar on standard error. It is visible only on a terminal.
 pub fn progress(what: &'static str, steps: usize) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg}: {pos} of {len}");
     let bar = ProgressBar::new(steps as u64).with_message(what);
@@ -21,7 +21,7 @@ pub fn progress(what: &'static str, steps: usize) -> ProgressBar {
     bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-/// A Markdown table with columns of one width each.
+/// Formats a Markdown table with aligned columns.
 pub(crate) fn table<const N: usize>(
     head: [&str; N],
     rows: impl IntoIterator<Item = [String; N]>,

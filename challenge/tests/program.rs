@@ -1,4 +1,4 @@
-//! `challenge` as a user runs it.
+//! Tests of the program `challenge` as a separate process.
 
 use std::{fs, path::Path};
 
@@ -12,7 +12,7 @@ fn challenge(folder: &Path, arguments: &[&str]) -> Command {
     command
 }
 
-/// What a run that succeeds prints.
+/// Runs the program, which must succeed, and returns its output.
 #[track_caller]
 fn runs(command: &mut Command) -> String {
     let output = command.output().unwrap();
@@ -20,7 +20,7 @@ fn runs(command: &mut Command) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// Runs to a failure whose message has a part.
+/// Runs the program, which must fail with a message that contains a text.
 #[track_caller]
 fn fails(command: &mut Command, code: i32, part: &str) {
     let output = command.output().unwrap();
@@ -43,7 +43,7 @@ fn a_check_keeps_its_labels_sealed() {
     let hash = text.split_whitespace().last().unwrap().to_owned();
     assert_eq!(hash.len(), 64);
     fails(&mut challenge(here, &make), 1, "check");
-    // what is answered already is left as it is
+    // an existing answer is not changed
     let answer = r#"{"schema":2,"verdict":"no_gap","named":[],"ambiguous":[],"candidates":[],"runtime_s":0.5}"#;
     for case in ["case-000", "case-001"] {
         fs::write(check.join(case).join("diagnosis.json"), answer).unwrap();
@@ -54,7 +54,7 @@ fn a_check_keeps_its_labels_sealed() {
     let page = fs::read_to_string(check.join("report.html")).unwrap();
     let page = testkit::page::without_program(&page);
     assert!(page.contains(&hash) && page.contains("Every miss") && !page.contains("NaN"));
-    // a label that was altered afterwards is found out
+    // a change of the labels after sealing is detected
     let labels = check.join("sealed/truth.json");
     let text = fs::read_to_string(&labels).unwrap();
     fs::write(&labels, text.replacen("\"excess\": ", "\"excess\": 1", 1)).unwrap();
@@ -80,7 +80,7 @@ fn a_case_is_diagnosed_away_from_its_label() {
         (Some("case-000"), Some(2))
     );
     assert_eq!(fs::read_dir(&rooms).unwrap().count(), 0);
-    // a case that cannot be diagnosed says why, and is no answer
+    // for a case that cannot be diagnosed, the reason is stored instead of an answer
     fs::remove_file(case.join("diagnosis.json")).unwrap();
     let trial = case.join("arbitrary_1.csv");
     let text = fs::read_to_string(&trial).unwrap();
@@ -121,7 +121,7 @@ fn counts_that_nobody_means_are_refused() {
     assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0);
 }
 
-/// Says of every case that nothing is missing.
+/// Returns a submission that answers every case with "nothing is missing".
 fn silent(set: &Path, cases: usize) -> Value {
     let seal = fs::read_to_string(set.join("seal.sha256")).unwrap();
     let answer = serde_json::json!({

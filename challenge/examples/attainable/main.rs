@@ -1,14 +1,15 @@
-//! What the diagnosis finds at best: simulated rigs with its own equations, effects in the
-//! catalogue's forms, clean noise of known size. What is missed or confounded here is not due to a
-//! form or a disturbance.
+//! Shows the best result that the diagnosis can reach. The simulated rigs have the equations of the
+//! diagnosis, effects in the forms of the catalogue, and white noise of known size. Errors here are
+//! therefore not caused by other forms or by disturbances.
 //!
-//! Two tables: how far nulls scatter, and which effects cannot be distinguished. Each is made for
-//! the paper's trials with and without a pressure column, and for these with one more trial at 0.7
-//! of the excitation. `book/src/results/sealed_cases.md` explains how to read them.
+//! There are two tables: the scatter of rigs without an effect (nulls), and the effects that cannot
+//! be distinguished. Each is made for the paper's trials with and without a pressure column, and
+//! for these with one more trial at 0.7 of the excitation. `book/src/results/sealed_cases.md`
+//! explains how to read them.
 //!
-//! `cargo run --release -p stretch-challenge --example attainable -- [NULLS [SEEDS]]`: nulls of
-//! each protocol (20), sessions of each effect and strength (1). `RAYON_NUM_THREADS` sets how many
-//! run at a time, otherwise the number of cores.
+//! `cargo run --release -p stretch-challenge --example attainable -- [NULLS [SEEDS]]`: NULLS is the
+//! number of nulls of each protocol (default 20), SEEDS the number of sessions of each effect and
+//! strength (default 1). `RAYON_NUM_THREADS` sets the number of threads (default: one per core).
 
 mod nulls;
 mod simulated;

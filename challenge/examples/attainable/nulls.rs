@@ -1,4 +1,4 @@
-//! Scatter of nulls: rigs without any effect, parameters within their tolerances.
+//! Scatter of nulls: rigs without effects, with parameters within their tolerances.
 
 use std::{fmt::Write, num::NonZeroUsize, ops::Range};
 
@@ -8,19 +8,19 @@ use stretch_challenge::shared_out;
 
 use crate::simulated::{Protocol, Source};
 
-/// What one null says.
+/// Result of one null.
 struct Null {
-    /// Excess of the re-tuned nominal.
+    /// Excess of the re-tuned nominal simulator.
     excess: f64,
     /// Highest score of a single effect, nats, and its name; `None` if no effect closes anything.
     best: Option<(f64, String)>,
-    /// The answer as the program gives it.
+    /// Verdict of the program.
     verdict: VerdictKind,
     named: Vec<String>,
 }
 
-/// Without acceptance criteria: the single effect with the highest score is taken whatever it
-/// closes.
+/// Returns thresholds without acceptance criteria: the effect with the highest score is accepted,
+/// whatever share of the gap it closes.
 fn without_criteria() -> Thresholds {
     let none = f64::NEG_INFINITY;
     Thresholds {
@@ -40,7 +40,7 @@ fn null(seed: u64, protocol: Protocol) -> anyhow::Result<Null> {
         protocol,
         Options { depth: NonZeroUsize::MIN, thresholds: without_criteria(), ..Options::default() },
     )?;
-    // `unknown`, and the empty set where nothing was taken, are no effects.
+    // The candidate `unknown` and the empty set are not effects.
     let singles =
         loose.candidates.iter().filter(|c| c.effects.len() == 1 && !c.parameters.is_empty());
     let best = singles.max_by(|a, b| a.score.total_cmp(&b.score));
@@ -53,7 +53,7 @@ fn null(seed: u64, protocol: Protocol) -> anyhow::Result<Null> {
     Ok(Null { excess: gap.retuned, best, verdict, named })
 }
 
-/// The table of the null band.
+/// Returns the table of the null band.
 pub(crate) fn band(seeds: Range<u64>) -> anyhow::Result<String> {
     let each = seeds.clone().count();
     let jobs = Protocol::ALL.len() * each;
@@ -91,7 +91,8 @@ pub(crate) fn band(seeds: Range<u64>) -> anyhow::Result<String> {
     Ok(text)
 }
 
-/// Median, nine tenths, and the greatest: of n numbers the one at rank q n, rounded up.
+/// Returns the median, the 0.9 quantile and the maximum. The quantile q of n numbers is the number
+/// with the rank q n, rounded up.
 fn quantiles(mut numbers: Vec<f64>) -> [f64; 3] {
     numbers.sort_by(f64::total_cmp);
     let at = |q: f64| {

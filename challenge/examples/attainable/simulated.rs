@@ -1,4 +1,5 @@
-//! Sessions of the rig itself, drawn within its tolerances, in clean noise; and their diagnoses.
+//! Simulated sessions of the built-in rig, drawn within its tolerances, with white noise; and their
+//! diagnoses.
 
 use anyhow::Context;
 use stretch_data::{Channel, SessionTrial, Trial, TrialEntry};
@@ -6,21 +7,22 @@ use stretch_gap::{Diagnosis, Options, diagnose};
 use stretch_problem::{RigSession, RigSetup, RigSimulator};
 use stretch_sim::{Catalogue, Effect, Key, Rig, RunSettings, Session, TrialPlan};
 
-/// Share of the excitation in the further trial of `paper+`.
+/// Excitation in the additional trial of `paper+`, as a share of the usual one.
 const LOW: f64 = 0.7;
-/// Number of the further arbitrary trial: the paper has three.
+/// Number of the additional arbitrary trial; the paper has three.
 const FURTHER: usize = 4;
-/// Column that the further trial tells its excitation in.
+/// Column of the excitation in the additional trial.
 const EXCITATION: &str = "excitation_share";
 
-/// Which trials were done and what was recorded.
+/// The trials of a session, and the recorded channels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Protocol {
-    /// The paper's seventeen trials, every channel.
+    /// The seventeen trials of the paper, with all channels.
     Paper,
-    /// The same without the pressure.
+    /// The same trials without the pressure.
     WithoutPressure,
-    /// The paper's and one more to fit, at [`LOW`] of the excitation, every channel.
+    /// The trials of the paper and one more for fitting, at [`LOW`] of the excitation, with all
+    /// channels.
     Plus,
 }
 
@@ -36,7 +38,7 @@ impl Protocol {
     }
 }
 
-/// What is simulated: a seed of parameters, protocol and noise, and at most one effect.
+/// The simulated system: a seed of parameters, protocol and noise, and at most one effect.
 #[derive(Debug, Clone)]
 pub(crate) struct Source {
     pub(crate) seed: u64,
@@ -52,7 +54,7 @@ impl Source {
         Ok(rig)
     }
 
-    /// The session as it would be recorded.
+    /// Simulates the recorded session.
     pub(crate) fn recorded(&self, protocol: Protocol) -> anyhow::Result<Vec<SessionTrial>> {
         let rig = self.rig()?;
         let settings = RunSettings { seed: self.seed, ..RunSettings::default() };
@@ -65,7 +67,7 @@ impl Source {
                 trials.iter_mut().for_each(|t| without(&mut t.trial));
             }
             Protocol::Plus => {
-                // What was before it leaves the same traces in it at either excitation: the muscle sees none.
+                // The previous trials run at the low excitation here, too. Their after-effects are the same, because the muscle does not depend on the excitation.
                 let mut low = rig.clone();
                 low.params[Key::VExc] *= LOW;
                 plans.push(TrialPlan::arbitrary(FURTHER, self.seed));
@@ -77,7 +79,7 @@ impl Source {
         Ok(trials)
     }
 
-    /// The diagnosis against the nominal rig.
+    /// Diagnoses the session with the nominal rig as simulator.
     pub(crate) fn diagnosed(
         &self,
         protocol: Protocol,
@@ -86,7 +88,7 @@ impl Source {
         let catalogue = Catalogue::default();
         let session = RigSession::new(&self.recorded(protocol)?)?;
         let setup = RigSetup { session, rig: Rig::default(), catalogue: &catalogue };
-        // One thread each: the answers are the same, and sessions are shared out.
+        // Each diagnosis uses one thread, because sessions run in parallel. The answers do not depend on it.
         let options = Options { threads: 1, ..options };
         Ok(diagnose(&RigSimulator::new(setup)?, &options, &|_| (), &|| false)?.0)
     }

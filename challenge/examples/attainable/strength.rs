@@ -1,4 +1,4 @@
-//! How strong an effect has to be for a stated excess.
+//! Finds the strength of an effect that causes a given excess.
 
 use anyhow::Context;
 use stretch_gap::{Options, Thresholds};
@@ -8,27 +8,29 @@ use crate::simulated::{Protocol, Source};
 
 /// Largest number of sessions that are simulated for one excess.
 const MOST: usize = 12;
-/// The excess may miss its aim by this factor.
+/// Largest accepted ratio between the excess and its target.
 const NEAR: f64 = 1.7;
-/// Smallest excess that is interpolated with: below it chance decides.
+/// Smallest excess that is used for interpolation; smaller values are dominated by chance.
 const LEAST: f64 = 1e-3;
-/// Factor by which one step of the search goes on at most.
+/// Largest factor by which one step of the search changes the strength.
 const STEP: f64 = 8.0;
-/// Shares closer to each other than this factor have nothing between them: the excess jumps.
+/// If the ratio of two strengths is below this factor, the search between them ends, because the
+/// excess jumps.
 const JUMP: f64 = 1.003;
-/// Largest share of the range; an effect at the end of its range is not announced.
+/// Largest share of the range; an effect at the end of its range would not be named.
 const END: f64 = 0.8;
-/// Share that is looked at first.
+/// Share that is tried first.
 const FIRST: f64 = 0.1;
 
-/// A share of the way from off to the end of an effect's range, and the excess there.
+/// A strength, as a share of the distance from the off value to the end of the range, and the
+/// excess at this strength.
 #[derive(Debug, Clone, Copy)]
 struct Point {
     share: f64,
     excess: f64,
 }
 
-/// The strengths of an effect on one rig that were tried.
+/// The strengths of an effect that were tried on one rig.
 #[derive(Debug)]
 pub(crate) struct Strengths {
     effect: &'static Effect,
@@ -41,9 +43,9 @@ impl Strengths {
         Self { effect, seed, points: Vec::new() }
     }
 
-    /// The source whose excess on the trials of the paper is near an aim, and that excess. If the
-    /// range ends before the aim, the source at its end; if the excess jumps over the aim, the
-    /// source after the jump.
+    /// Returns the source whose excess on the trials of the paper is near the target `aim`, and
+    /// that excess. If no strength in the range reaches the target, returns the source at the end
+    /// of the range. If the excess jumps over the target, returns the source after the jump.
     pub(crate) fn near(&mut self, aim: f64) -> anyhow::Result<(Source, f64)> {
         let off_by = |p: &Point| (p.excess / aim).ln().abs();
         for step in 0..MOST {
@@ -62,32 +64,32 @@ impl Strengths {
         Ok((self.source(point.share), point.excess))
     }
 
-    /// The strongest of those that fall short of an aim.
+    /// Returns the largest strength whose excess is below the target.
     fn below(&self, aim: f64) -> Option<&Point> {
         let below = self.points.iter().filter(|p| p.excess < aim);
         below.max_by(|a, b| a.share.total_cmp(&b.share))
     }
 
-    /// The weakest of those that reach it.
+    /// Returns the smallest strength whose excess reaches the target.
     fn above(&self, aim: f64) -> Option<&Point> {
         let above = self.points.iter().filter(|p| p.excess >= aim);
         above.min_by(|a, b| a.share.total_cmp(&b.share))
     }
 
-    /// Where to look next; `None` if nothing is left between, or beyond.
+    /// Returns the next strength to try; `None` if the search has ended.
     fn next(&self, aim: f64, halves: bool) -> Option<f64> {
         match (self.below(aim), self.above(aim)) {
             (None, None) => Some(FIRST),
             (Some(a), Some(b)) if b.share < JUMP * a.share => None,
-            // The middle and a linear interpolation of logarithms alternate, because a threshold
-            // bends the line.
+            // Bisection and linear interpolation of the logarithms alternate, because a threshold
+            // bends the curve.
             (Some(a), Some(b)) if halves => Some((a.share * b.share).sqrt()),
             (Some(a), Some(b)) => {
                 let way = (aim / a.excess).ln() / (b.excess / a.excess).ln();
                 Some(a.share * (b.share / a.share).powf(way))
             }
             (Some(a), None) if a.share >= END => None,
-            // Excess goes with the square of a strength.
+            // The excess is assumed to be proportional to the square of the strength.
             (one, other) => one.or(other).map(|p| {
                 let times = (aim / p.excess).sqrt().clamp(1.0 / STEP, STEP);
                 (p.share * times).min(END)
@@ -96,7 +98,7 @@ impl Strengths {
     }
 
     fn excess(&self, share: f64) -> anyhow::Result<f64> {
-        // Nothing counts as unknown, because only the excess is needed, not its cause.
+        // The threshold switches the verdict `unknown` off, because only the excess is needed.
         let thresholds = Thresholds { unknown_excess: f64::INFINITY, ..Thresholds::frozen() };
         let options = Options { examines_effects: false, thresholds, ..Options::default() };
         let diagnosis = self.source(share).diagnosed(Protocol::Paper, options)?;
@@ -108,8 +110,8 @@ impl Strengths {
     }
 }
 
-/// Values of an effect. Its last strength is set to `share` of the distance between off and the farther end of its range.
-/// Shapes are typical and forms usual, because a diagnosis starts there.
+/// Returns the values of an effect. Its last strength is at the share `share` of the distance from the off value to the
+/// farther end of its range. Shapes and forms have the values at which a diagnosis starts.
 fn values(effect: &'static Effect, share: f64) -> Vec<f64> {
     let last = effect.parameters.iter().rposition(|p| p.off().is_some());
     let one = |(i, p): (usize, &EffectParameter)| match p.off() {

@@ -1,4 +1,5 @@
-//! Which effects cannot be distinguished: every effect of the catalogue at two strengths.
+//! Finds effects that cannot be distinguished: tests every effect of the catalogue at two
+//! strengths.
 
 use std::{
     fmt::{Display, Formatter, Write},
@@ -13,33 +14,33 @@ use stretch_challenge::shared_out;
 
 use crate::{simulated::Protocol, strength::Strengths};
 
-/// Excesses aimed at: a weak and a strong effect.
+/// Targets of the excess: a weak and a strong effect.
 const AIMS: [f64; 2] = [0.55, 10.0];
 /// Protocols that are compared.
 const PROTOCOLS: [Protocol; 2] = [Protocol::Paper, Protocol::Plus];
 
-/// The table lists an alternative that is at most so many nats behind the true effect, or ahead of
-/// it. At the temperature of the probabilities, five nats, it has a four-hundredth of the true
-/// one's probability.
+/// The table lists the best other effect if its score differs from that of the true effect by less
+/// than this, nats. At a temperature of five nats, a difference of 30 nats is a ratio of 1/400 of
+/// the probabilities.
 const NEAR_NATS: f64 = 30.0;
 
-/// What is said of one session.
+/// Result of one session.
 #[derive(Debug)]
 struct Said {
-    /// In the words of the table.
+    /// Text in the table.
     answer: String,
-    /// The best of the other effects, and by how many nats it exceeds the true one.
+    /// The best other effect, and its score minus that of the true effect, nats.
     nearest: Option<(String, f64)>,
 }
 
-/// One effect at one strength: its excess, and what is said by protocol.
+/// One effect at one strength: its excess, and the result by protocol.
 #[derive(Debug)]
 struct Cell {
     excess: f64,
     said: [Said; 2],
 }
 
-/// Weak and strong.
+/// The weak and the strong effect.
 type Row = [Cell; 2];
 
 impl Said {
@@ -48,7 +49,7 @@ impl Said {
     }
 }
 
-/// Whether the true name is alone, tied, or absent.
+/// Describes whether the true effect is named alone, in a tie, or not at all.
 fn answer(truth: &str, diagnosis: &Diagnosis) -> String {
     let answer = &diagnosis.answer;
     let (named, tied, gross) = (answer.named(), answer.tied(), answer.gross());
@@ -74,12 +75,12 @@ fn nearest(truth: &str, diagnosis: &Diagnosis) -> Option<(String, f64)> {
     let (own, others): (Vec<_>, Vec<_>) =
         effects.partition(|c| c.effects.iter().any(|e| e == truth));
     let best = others.into_iter().max_by(|a, b| a.score.total_cmp(&b.score))?;
-    // If the true effect was not even fitted, it counts as closing nothing.
+    // If the true effect was not fitted, its score is 0.
     let truth = own.first().map_or(0.0, |c| c.score);
     Some((best.effects.join(" + "), best.score - truth))
 }
 
-/// One effect on one rig at both strengths.
+/// Tests one effect on one rig at both strengths.
 fn row(effect: &'static Effect, seed: u64) -> anyhow::Result<Row> {
     let mut strengths = Strengths::of(effect, seed);
     let cell = |aim| -> anyhow::Result<Cell> {
@@ -99,8 +100,8 @@ fn row(effect: &'static Effect, seed: u64) -> anyhow::Result<Row> {
     Ok([weak?, strong?])
 }
 
-/// The table of ties, one row per effect; if sessions of several seeds differ, each has its part of
-/// a cell.
+/// Returns the table of ties, one row per effect. If the results of several seeds differ, the cell
+/// lists each of them.
 pub(crate) fn matrix(seeds: Range<u64>) -> anyhow::Result<String> {
     let effects: Vec<&'static Effect> = Catalogue::default().iter().collect();
     let each = seeds.clone().count();
@@ -123,7 +124,7 @@ pub(crate) fn matrix(seeds: Range<u64>) -> anyhow::Result<String> {
     Ok(text)
 }
 
-/// What sessions say, once where all say the same.
+/// Joins the results of sessions; equal neighbours are listed once.
 fn in_one(answer: impl Iterator<Item = String>) -> String {
     let mut answer: Vec<String> = answer.collect();
     answer.dedup();

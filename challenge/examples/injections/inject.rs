@@ -1,37 +1,38 @@
-//! Effects in independent forms, added to a measured signal.
+//! Effects that are added to a measured signal, in forms that do not come from the catalogue.
 
 use stretch_effects::play;
 
-/// What is done to a signal.
+/// The kinds of effects.
 #[derive(Debug, Clone, Copy)]
 enum Kind {
-    /// It shows what was so many milliseconds before.
+    /// A delay, ms.
     Late,
-    /// It sinks by so many per cent of its span a minute.
+    /// A falling drift, percent of the span per minute.
     Drift,
-    /// It follows with a time constant of so many milliseconds.
+    /// A first-order lag with a time constant, ms.
     Lag,
-    /// It follows once a play of so many per cent of its span to either side is used up.
+    /// A play with a half-width, percent of the span.
     Play,
-    /// It cannot rise beyond so many per cent of its span.
+    /// An upper limit, percent of the span.
     Clip,
 }
 
-/// An effect that is put into a signal.
+/// An effect that is added to a signal.
 #[derive(Debug)]
 pub(crate) struct Injection {
     kind: Kind,
-    /// Whether it acts ahead of the sensor's noise.
+    /// Whether the effect acts before the noise of the sensor is added.
     is_ahead: bool,
     pub(crate) words: &'static str,
     /// Unit of the strengths.
     unit: &'static str,
     pub(crate) strengths: [f64; 3],
-    /// What the catalogue calls it.
+    /// Name in the catalogue.
     pub(crate) name: &'static str,
-    /// Other names that a recording of two minutes of similar strokes may not distinguish from it.
+    /// Other effects that may be indistinguishable from it in two minutes of similar strokes.
     pub(crate) kin: &'static [&'static str],
-    /// Its strength among the parameters of the effect, and the conversion from our strength.
+    /// The parameter of the catalogue's effect that is its strength, and the factor from its unit
+    /// to ours.
     pub(crate) size: Option<(&'static str, f64)>,
 }
 
@@ -84,7 +85,7 @@ pub(crate) const ALL: [Injection; 7] = [
     Injection { is_ahead: true, words: "lag, noise after it,", ..LAG },
     PLAY,
     Injection { is_ahead: true, words: "play, noise after it,", ..PLAY },
-    // Not searched in a gauge alone, whose amplifier is unknown.
+    // This effect is not searched in a gauge alone, because the limits of its amplifier are unknown.
     Injection {
         kind: Kind::Clip,
         is_ahead: false,
@@ -98,12 +99,12 @@ pub(crate) const ALL: [Injection; 7] = [
 ];
 
 impl Injection {
-    /// Such as `late 30 ms`.
+    /// Returns a description such as `late 30 ms`.
     pub(crate) fn in_words(&self, strength: f64) -> String {
         format!("{} {strength} {}", self.words, self.unit)
     }
 
-    /// Puts it into a signal.
+    /// Adds the effect to a signal.
     pub(crate) fn apply(&self, strength: f64, time_s: &[f64], signal: &mut [f64]) {
         let low = signal.iter().copied().fold(f64::INFINITY, f64::min);
         let high = signal.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -124,7 +125,8 @@ impl Injection {
     }
 }
 
-/// y(t) -> y(t - delay), linear between samples, the first value held.
+/// Replaces y(t) by y(t - delay), with linear interpolation. Before the start, the first value is
+/// used.
 fn late(delay_s: f64, time_s: &[f64], signal: &mut [f64]) {
     let recorded = signal.to_vec();
     let mut at = 0;
@@ -140,7 +142,7 @@ fn late(delay_s: f64, time_s: &[f64], signal: &mut [f64]) {
     }
 }
 
-/// tau z' = x - z from rest, the input between two samples their mean.
+/// Replaces x by z with tau z' = x - z, from rest. Between two samples the input is their mean.
 fn lag(tau_s: f64, time_s: &[f64], signal: &mut [f64]) {
     let Some(&first) = signal.first() else { return };
     let (mut z, mut before) = (first, first);
@@ -151,7 +153,7 @@ fn lag(tau_s: f64, time_s: &[f64], signal: &mut [f64]) {
     }
 }
 
-/// A play of half-width `w`, at its middle to begin with.
+/// Applies a play of half-width `w` that begins in its middle.
 fn slip(w: f64, signal: &mut [f64]) {
     let mut z = signal.first().copied().unwrap_or(0.0);
     for y in signal {
@@ -160,14 +162,15 @@ fn slip(w: f64, signal: &mut [f64]) {
     }
 }
 
-/// Samples to either side whose mean is taken for the signal without its noise: 0.11 s at 100 Hz.
+/// Number of samples on each side. The mean over these samples (0.11 s at 100 Hz) is used as the
+/// signal without noise.
 const BESIDE: usize = 5;
 
-/// Acts on the signal without its noise, which is added again, because what slips or trails before
-/// the sensor does not slow or stop the sensor's noise.
+/// Applies an effect to the signal without its noise, and adds the noise again, because an effect
+/// before the sensor does not change the noise of the sensor.
 fn ahead_of_noise(signal: &mut [f64], act: impl Fn(&mut [f64])) {
     let mean = |i: usize| {
-        // Equally many to either side, so that a slope is no bias at the ends.
+        // The number of samples is equal on both sides, so that a slope causes no bias at the ends.
         let beside = BESIDE.min(i).min(signal.len() - 1 - i);
         let window = &signal[i - beside..=i + beside];
         window.iter().sum::<f64>() / window.len() as f64

@@ -1,7 +1,7 @@
-//! Compares a diagnosis before and after a known effect was added to a measured record.
+//! Compares diagnoses of a measured recording before and after a known effect is added to it.
 //!
-//! Eight recordings of a knitted sleeve on a knee, each with an unknown gap; five effects, three strengths.
-//! `book/src/results/injections.md` has the tables and explains how to read them.
+//! There are eight recordings of a knitted sleeve on a knee, each with an unknown gap, and five effects at
+//! three strengths. `book/src/results/injections.md` has the tables and explains how to read them.
 //!
 //! `cargo run --release -p stretch-challenge --example injections -- ../shared/data/knit_sleeve`
 
@@ -19,7 +19,8 @@ use stretch_recording::{ReadOptions, Recording};
 use stretch_sim::Catalogue;
 use tables::{Said, tables};
 
-/// Every session and every sensor at least once; the last two get a `partial` answer in their whole length.
+/// Sessions and sensors; each occurs at least once. The last two recordings have the verdict `partial` at
+/// their full length.
 const RECORDS: [(&str, &str); 8] = [
     ("heel_curl_45_1", "s1"),
     ("heel_curl_45_2", "s2"),
@@ -31,11 +32,11 @@ const RECORDS: [(&str, &str); 8] = [
     ("lift_up_1", "s3"),
 ];
 const REFERENCE: &str = "angle_deg";
-/// What is taken of a session, s.
+/// Length of the part of a session that is used, s.
 const LENGTH_S: f64 = 120.0;
 const WORKERS: usize = 2;
 
-/// The first [`LENGTH_S`] of a session: the reference and one sensor.
+/// Reads the reference and one sensor over the first [`LENGTH_S`] of a session.
 fn record(folder: &Path, session: &str, sensor: &str) -> anyhow::Result<Trial> {
     let options = ReadOptions::new().require(REFERENCE).require(sensor);
     let whole = Recording::read(folder.join(format!("{session}.csv")), &options)?.trial;
@@ -47,7 +48,7 @@ fn record(folder: &Path, session: &str, sensor: &str) -> anyhow::Result<Trial> {
     Ok(Trial { name: whole.name.clone(), time_s: whole.time_s[..samples].to_vec(), channels })
 }
 
-/// The recording as it is, or with an effect in its signal, diagnosed.
+/// Diagnoses a recording unchanged, or with an effect added to its signal.
 fn said(record: &Trial, injected: Option<(&Injection, usize)>) -> anyhow::Result<Said> {
     let mut trial = record.clone();
     if let Some((injection, which)) = injected {
@@ -63,7 +64,7 @@ fn said(record: &Trial, injected: Option<(&Injection, usize)>) -> anyhow::Result
         rig: None,
         catalogue: &Catalogue::default(),
     })?;
-    // One thread each: the answers are the same, and recordings are shared out.
+    // Each diagnosis uses one thread, because recordings run in parallel. The answers do not depend on it.
     let options = Options { threads: 1, ..Options::default() };
     let (diagnosis, _) = diagnose(&gauge, &options, &|_| (), &|| false)?;
     Ok(Said { diagnosis, noticed: gauge.notes().to_vec() })
@@ -86,7 +87,7 @@ fn main() -> anyhow::Result<()> {
         .iter()
         .map(|(session, sensor)| record(folder, session, sensor))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    // Case 0 of a recording is the recording as it is.
+    // Case 0 of a recording is the unchanged recording.
     let cases: Vec<Option<(&Injection, usize)>> = std::iter::once(None)
         .chain(ALL.iter().flat_map(|i| (0..i.strengths.len()).map(move |which| Some((i, which)))))
         .collect();

@@ -1,4 +1,4 @@
-//! What was said of recordings, counted.
+//! Counts the answers for all recordings.
 
 use std::fmt::Write;
 
@@ -6,16 +6,16 @@ use stretch_gap::{Diagnosis, VerdictKind};
 
 use super::inject::{ALL, Injection};
 
-/// What was said of one record.
+/// Answer for one recording.
 #[derive(Debug)]
 pub(crate) struct Said {
     pub(crate) diagnosis: Diagnosis,
-    /// What was noticed while it was read.
+    /// Notes from reading the recording.
     pub(crate) noticed: Vec<String>,
 }
 
 impl Said {
-    /// The verdict, names, shares and rivals in a line.
+    /// Returns verdict, names, shares and alternatives in one line.
     pub(crate) fn in_short(&self) -> String {
         let d = &self.diagnosis;
         let shares: Vec<String> =
@@ -31,7 +31,7 @@ impl Said {
         )
     }
 
-    /// In which of the places of [`PLACES`] one of the names is.
+    /// Whether one of the names occurs in each of the [`PLACES`].
     fn places(&self, names: &[&str]) -> [bool; 5] {
         let d = &self.diagnosis;
         let is = |name: &String| names.contains(&name.as_str());
@@ -44,13 +44,13 @@ impl Said {
         ]
     }
 
-    /// The effect of the best set that closes most, if one closes anything.
+    /// Returns the effect of the best set that closes most; `None` if no effect closes anything.
     fn largest(&self) -> Option<&String> {
         let closing = self.diagnosis.shares.iter().filter(|s| s.closes > 0.0);
         closing.max_by(|a, b| a.closes.total_cmp(&b.closes)).map(|s| &s.effect)
     }
 
-    /// A parameter of an effect in the most probable candidate that has it.
+    /// Returns a parameter of an effect, from the most probable candidate that contains the effect.
     fn size(&self, effect: &str, parameter: &str) -> Option<f64> {
         let with = |name: &String| name == effect;
         let best = self.diagnosis.candidates.iter().find(|c| c.effects.iter().any(with))?;
@@ -58,8 +58,8 @@ impl Said {
         own.map(|p| p.value)
     }
 
-    /// Whether a name is neither the added effect, nor its kin, nor in the 95 % set of the
-    /// unchanged record.
+    /// Whether a named effect is none of these: the added effect, its similar effects (`kin`), and
+    /// the 95 % set of the unchanged recording.
     fn names_strangely(&self, injection: &Injection, before: &Said) -> bool {
         let is_known = |name: &String| {
             name == injection.name
@@ -69,18 +69,19 @@ impl Said {
         !self.diagnosis.named().iter().all(is_known)
     }
 
-    /// Whether the diagnosis noticed that the signal stays at its largest value.
+    /// Whether a note says that the signal stays at its largest value.
     fn stands(&self) -> bool {
         self.noticed.iter().any(|n| n.contains("stands at its greatest"))
     }
 }
 
-/// Where a name can be.
+/// Places in an answer where a name can occur.
 const PLACES: [&str; 5] = ["named", "in a tie", "95 % set", "best set", "largest part"];
-/// The verdicts, as they are counted.
+/// The counted verdicts.
 const VERDICTS: [&str; 5] = ["effect", "partial", "unknown", "record", "none"];
 
-/// The tables, from the diagnoses of the unchanged recordings and of each injection at each strength.
+/// Returns the tables, from the diagnoses of the unchanged recordings and of each effect at each
+/// strength.
 pub(crate) fn tables(untouched: &[Said], injected: &[&[Said]]) -> String {
     let mut text = String::new();
     let rows = || ALL.iter().flat_map(|i| i.strengths.map(|s| (i, s))).zip(injected);
@@ -117,7 +118,7 @@ pub(crate) fn tables(untouched: &[Said], injected: &[&[Said]]) -> String {
 
 fn heading(text: &mut String, title: &str, columns: &[&str]) {
     let rule = "| --- ".repeat(columns.len());
-    // Nothing can go wrong while a string is written.
+    // Writing to a string cannot fail.
     let _ = writeln!(text, "\n{title}\n\n| injected | {} |\n| --- {rule}|", columns.join(" | "));
 }
 
@@ -125,7 +126,8 @@ fn line(text: &mut String, what: &str, cells: &[String]) {
     let _ = writeln!(text, "| {what} | {} |", cells.join(" | "));
 }
 
-/// In how many recordings one of the names is in each place; before the injection in brackets.
+/// Returns for each place the number of recordings in which one of the names occurs; the number
+/// before the effect was added is in brackets.
 fn found(names: &[&str], untouched: &[Said], said: &[Said]) -> [String; 5] {
     let count = |all: &[Said], at: usize| all.iter().filter(|one| one.places(names)[at]).count();
     std::array::from_fn(|at| format!("{} ({})", count(said, at), count(untouched, at)))
@@ -145,9 +147,10 @@ fn verdicts(said: &[Said]) -> [usize; 5] {
     counts
 }
 
-/// By how much the fitted strength grew, and over how many recordings; by what factor the gap grew;
-/// in how many recordings the signal is noticed to stay at its top; in how many the largest part
-/// changed; in how many a new name appeared.
+/// Returns the changes by an effect: median increase of the fitted strength, number of recordings
+/// in which it was fitted, median factor of the gap; and the numbers of recordings in which a note
+/// says that the signal stays at its top, the effect that closes most changed, and a new name
+/// appeared.
 fn changes(injection: &Injection, untouched: &[Said], said: &[Said]) -> [String; 6] {
     let pairs = || untouched.iter().zip(said);
     let mut grown: Vec<f64> = match injection.size {

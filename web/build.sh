@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Builds the page, one file that needs nothing else: target/page/index.html. PROFILE names another profile than wasm.
+# Builds the page as one self-contained file: target/page/index.html. PROFILE is another build profile than wasm.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 profile=${PROFILE:-wasm}

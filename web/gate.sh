@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
-# The gate of the reports' script and of the page, the same on a desk and in CI: types, sizes, reports touched in a browser and the
-# page used there, at the width of a phone and of a desk, in light and dark. It says SKIPPED and why where there is no node, npm,
-# Chromium or WASM target.
-# CHROMIUM names another browser, STRETCH another program than a fresh build, SHOTS a folder for pictures of the pages.
+# Checks the script of the reports and the page, locally and in CI: types, sizes, and tests of reports and page in a browser, at the widths
+# of a phone and of a desktop, in light and dark mode. It prints SKIPPED and the reason if node, npm, Chromium or the WASM target is missing.
+# CHROMIUM is the path of another browser, STRETCH that of another program than a fresh build, SHOTS a folder for screenshots.
 set -euo pipefail
 cd "$(dirname "$0")"
 target=${CARGO_TARGET_DIR:-$PWD/../target}
@@ -22,7 +21,7 @@ else
     part="the page" skip "there is no standard library of wasm32-unknown-unknown: rustup target add wasm32-unknown-unknown"
 fi
 
-# the gate of the project builds the page while other steps run, and says `built` later
+# the gate of the project calls this script twice: with `build` while other steps run, and later with `built`
 [ "${1:-}" != build ] || exit 0
 
 command -v node >/dev/null 2>&1 || { skip "there is no node"; exit 0; }
@@ -49,7 +48,7 @@ else
 fi
 bench=$fresh/bench
 stretch simulate --protocol paper --rig paper --out "$bench" >/dev/null
-# a name that would run, were it not written as text
+# a file name that would run as a script if the report did not escape it
 named="$fresh/<img src=x onerror=window.injected=1>.csv"
 cp "$bench"/arbitrary_1.csv "$named"
 trials=("$bench"/inflation_50.csv "$bench"/deflation_50.csv "$named")
@@ -58,21 +57,21 @@ stretch calibrate "${trials[@]}" --model observer --out "$fresh/memory.json" --r
 stretch diagnose "$bench" --report "$fresh/diagnosis.html" --json="$fresh/diagnosis.json" >"$fresh/diagnosis.txt"
 stretch demo --out "$fresh/demo" >/dev/null
 reports=("$fresh"/{surface,memory,diagnosis}.html "$fresh"/demo/report.html)
-# the page that challenge/gate.sh wrote last
+# the page that the last run of challenge/gate.sh wrote
 challenge=$target/challenge-check/report.html
 if [ -f "$challenge" ]; then reports+=("$challenge"); else skip "the challenge's page: challenge/gate.sh writes one"; fi
 ls -l "${reports[@]}" | awk '{ n = split($9, part, "/"); print $5 " bytes: " part[n] }'
 node "$fresh/report.mjs" ${SHOTS:+--shots "$SHOTS"} "${reports[@]}"
 
 has_wasm || exit 0
-# what the page saves is compared with what the program writes
+# files of the program, with which the files saved by the page are compared
 stretch calibrate "$bench" --model poly13 --out "$fresh/poly13.json" >/dev/null
 stretch calibrate "$bench" --model observer --out "$fresh/observer.json" >/dev/null
 stretch export --calibration "$fresh/observer.json" --c "$fresh/header" >/dev/null
 node "$fresh/frames.mjs" >"$fresh/linked.txt"
 stretch listen --port - --calibration "$fresh/poly13.json" --out "$fresh/linked.csv" \
     <"$fresh/linked.txt" >/dev/null 2>"$fresh/linked.told"
-# and what makes one doubt a calibration on a trial: a name, what becomes of its columns, and the trial that it is made of
+# trials that cause doubts: name, change of the columns, and the trial from which it is made
 doubted=$fresh/doubted
 mkdir "$doubted"
 for model in linear poly13; do
@@ -91,7 +90,7 @@ doubt not_connected '$6 = 1.5' arbitrary_1
 doubt fitted '' inflation_50
 stretch evaluate --calibration "$fresh/poly13.json" "$bench/arbitrary_1.csv" >"$fresh/evaluated.txt" 2>/dev/null
 stretch apply --calibration "$fresh/poly13.json" "$bench/arbitrary_1.csv" --out "$fresh/estimate.csv" >/dev/null 2>&1
-# a stream twice as fast, of a sensor that is not connected
+# a stream at twice the sample rate, from a sensor that is not connected
 awk -F, -v OFS=, 'NR == 1 { print $1, $6 } NR > 1 { print $1 / 2, 1.5 }' "$bench/arbitrary_1.csv" >"$fresh/doubted.txt"
 stretch apply --calibration "$fresh/poly13.json" - <"$fresh/doubted.txt" >/dev/null 2>"$fresh/doubted.told"
 node "$fresh/page.mjs" ${SHOTS:+--shots "$SHOTS"} "$target/page/index.html" "$bench" "$fresh" ../firmware/golden.txt

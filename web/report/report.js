@@ -1,7 +1,7 @@
 /*
- * A report's figures answer when they are touched. Without this script the drawings in the page stand as they are;
- * with it, time plots zoom and pan together, bars and scatters show their samples in them, and surfaces turn.
- * What is drawn comes from the JSON inside each figure; nothing is fetched.
+ * Makes the figures of a report interactive. Time plots zoom and pan together, bars and scatter plots highlight their
+ * samples in the time plots, and surfaces can be rotated. Without this script the figures are static drawings.
+ * The data come from the JSON in each figure; nothing is fetched.
  */
 (() => {
   "use strict";
@@ -52,7 +52,7 @@
     element.textContent = words;
   };
 
-  /** @param {number} x @param {number} span A number that tells apart what lies a thousandth of a span apart. */
+  /** @param {number} x @param {number} span Formats a number with enough decimals for a thousandth of a span. */
   const number = (x, span) => {
     if (!Number.isFinite(x)) return "\u2013";
     const decimals = Math.min(Math.max(Math.ceil(3 - Math.log10(Math.abs(span) || 1)), 0), 9);
@@ -62,7 +62,7 @@
   /** @param {string} value @param {string} unit */
   const withUnit = (value, unit) => (unit ? `${value}\u00a0${unit}` : value);
 
-  /** @param {number} low @param {number} high @param {number} most Round numbers within a span. */
+  /** @param {number} low @param {number} high @param {number} most Returns round numbers in a span. */
   const ticks = (low, high, most) => {
     const rough = (high - low) / Math.max(most, 1);
     if (!(rough > 0) || !Number.isFinite(rough)) return { values: [], decimals: 0 };
@@ -87,7 +87,7 @@
     return { t, dt, y };
   };
 
-  /** @param {Level[]} levels @param {number[]} window The finest of them that covers a window. */
+  /** @param {Level[]} levels @param {number[]} window Returns the finest level that covers a window. */
   const fitting = (levels, [from, to]) => {
     const covers = (/** @type {Level} */ { t, dt, y }) => t <= from + dt && t + dt * y.length >= to - dt;
     return levels.filter(covers).reduce((a, b) => (b.dt < a.dt ? b : a), levels[0]);
@@ -129,7 +129,7 @@
   const hide = () => { tip.hidden = true; };
 
   /**
-   * Puts a live drawing in the place of the still ones.
+   * Replaces the static drawings by an interactive one.
    * @param {HTMLElement} figure
    * @param {string} hint
    * @param {string} keys
@@ -148,7 +148,7 @@
   };
 
   /**
-   * Entries of a legend become switches of what bears their ink.
+   * Makes the entries of a legend switches, which hide and show the shapes of their colour.
    * @param {HTMLElement} figure
    * @param {() => void} after
    * @returns {Set<string>}
@@ -176,7 +176,7 @@
   };
 
   /**
-   * Drags with one pointer, pinches with two.
+   * Handles gestures: dragging with one pointer, pinching with two.
    * @param {SVGSVGElement} box
    * @param {(dx: number, dy: number) => void} drag
    * @param {(factor: number, x: number) => void} pinch
@@ -211,7 +211,7 @@
   const time = (figure, data) => {
     const link = linked(data.link, data.view);
     const own = data.series.map((s) => ({ ...s, levels: s.levels.map(unpacked) }));
-    // the plot of the whole recording draws what the closer look brought
+    // a plot of the whole recording without data draws the curves of the linked plot
     const series = own.length > 0 ? own : link.series;
     link.series = series;
     if (data.moves) link.moving.push({ by: data.moves, series: own });
@@ -221,7 +221,7 @@
       "Drag to move, click and turn the wheel or pinch to zoom, tap a name to switch its line off.",
       "Arrow keys move, plus and minus zoom, 0 shows it as it was.");
     const off = switches(figure, () => draw());
-    // a plot of the whole recording shows the linked window as a frame
+    // a plot of the whole recording marks the window of the linked plots by a frame
     const seen = () => (data.all ? data.span : link.window);
     let [width, height] = [880, data.height];
     let y = [0, 1];
@@ -259,7 +259,7 @@
       y = [low - pad, high + pad];
     };
 
-    /** @param {Pick} pick Stretches of time whose samples are picked. */
+    /** @param {Pick} pick Returns the time intervals of the selected samples. */
     const picked = (pick) => {
       const [from, to] = seen();
       if (pick.by === "time") return [[Math.max(pick.from, from), Math.min(pick.to, to)]].filter(([a, b]) => b > a);
@@ -377,7 +377,7 @@
       pan(data.all ? by : -by);
     }, (factor, x) => zoom(factor, where(x)));
     box.addEventListener("wheel", (event) => {
-      // the page scrolls under a plot that nobody has clicked
+      // the wheel scrolls the page unless the plot has the focus
       if (!(event.ctrlKey || document.activeElement === box)) return;
       event.preventDefault();
       zoom(Math.exp(Math.max(-0.5, Math.min(event.deltaY * 0.002, 0.5))), where(event.clientX));
@@ -535,7 +535,7 @@
     /** @type {{x: number, y: number, lines: string[]}[]} */
     let shown = [];
 
-    /** @param {number[]} p The page's place of a point of the unit cube, and how far behind it is. */
+    /** @param {number[]} p Returns the position of a point of the unit cube on the page, and its depth. */
     const eye = ([u, r, z]) => {
       const [a, b] = [u - 0.5, r - 0.5];
       const across = Math.cos(yaw) * a - Math.sin(yaw) * b;
@@ -574,7 +574,7 @@
       const sr = side([u, 0.5, 0]);
       numbers(data.axes[1], (v) => [v, r, 0], 5 * su, su > 0 ? "start" : "end");
       numbers(data.axes[0], (v) => [u, v, 0], 5 * sr, sr > 0 ? "start" : "end");
-      // the corner farthest to the left bears the scale of the height
+      // the leftmost corner has the scale of the height
       const corners = [[0, 0], [0, 1], [1, 0], [1, 1]];
       const left = corners.reduce((a, b) => (eye([...b, 0])[0] < eye([...a, 0])[0] ? b : a));
       line([...left, 0], [...left, 1], "ink-axis");
@@ -667,7 +667,7 @@
   };
 
   /**
-   * Numbers to turn: a slider stops at the values that were simulated and goes straight between them.
+   * Sliders for the parameters of an effect. Between the simulated values, the output is interpolated linearly.
    * @param {HTMLElement} figure
    * @param {TurnData} data
    */
@@ -688,7 +688,7 @@
       const home = all.indexOf(fitted);
       return { ...one, all, home, place: home };
     });
-    /** @param {typeof turned[0]} one The two values on either side, and their shares. */
+    /** @param {typeof turned[0]} one Returns the two neighbouring simulated values, and their weights. */
     const between = ({ all, place }) => {
       const below = Math.min(Math.floor(place), all.length - 1);
       const share = place - below;
@@ -730,7 +730,7 @@
           for (let i = 0; i < y.length; i += 1) y[i] += sign * share * change[i];
         }
       }
-      // x' V^-1 x of what is left, with the fitted set first and the changes taken from it
+      // x' V^-1 x of the residual x: that of the fitted set (row 0) minus the changes
       const weights = [{ row: 0, w: 1 }, ...parts.map(({ knot, share }) => ({ row: knot.row, w: -share }))];
       let squares = 0;
       for (const a of weights) for (const b of weights) squares += a.w * b.w * data.products[a.row][b.row];
@@ -751,7 +751,7 @@
     told();
   };
 
-  /** @param {HTMLElement} figure What a legend switches off in a still drawing. */
+  /** @param {HTMLElement} figure Hides and shows the shapes of a static drawing by its legend. */
   const hidden = (figure) => {
     const off = switches(figure, () => {
       figure.querySelectorAll("svg .line, svg .area, svg .dots").forEach((shape) => {

@@ -1,21 +1,22 @@
 /*
- * A calibration: a model, or the one that does best on trials left out, which workers judge side by side.
+ * Calibration with a given model, or with the model that has the smallest error on trials that were left out of the fit.
+ * Workers evaluate the models in parallel.
  */
 
 /** @typedef {{sentence: string, table: Shown, trials: string[], doubts: string[]}} Errors */
 /** @typedef {{model: string, rmse: number|null, rmse_arbitrary: number|null, rmse_pulses: number|null, rmse_ramps: number|null, parameters: number, problem: string|null}} ModelRow */
 /** @typedef {{model: string, unit: string, rate_hz: number, why: [string, string]|null, models: ModelRow[], notes: string[]}} Made */
 
-/** Workers beyond it wait for memory more than they work. */
+/** Largest number of workers. With more, memory access limits the speed. */
 const MOST_HANDS = 4;
 
 const calibration = {
-  /** What was calibrated. */
+  /** Title of the report: what was calibrated. */
   title: "",
 
   choices: () => ({ model: select("model").value, reference: select("reference").value, signal: select("signal").value }),
 
-  /** A column that is no column of numbers is refused as the program refuses it. @param {Hand} hand @param {{reference: string, signal: string}} choices */
+  /** Reads recordings again that lack a chosen column of numbers, so that the error is that of the program. @param {Hand} hand @param {{reference: string, signal: string}} choices */
   async checked(hand, { reference, signal }) {
     for (const [name, about] of state.recordings) {
       const file = state.files.get(name);
@@ -24,12 +25,12 @@ const calibration = {
     }
   },
 
-  /** Judges every model, as many at once as there are cores. @param {Hand} first @param {object} choices */
+  /** Evaluates all models, with at most one worker per core. @param {Hand} first @param {object} choices */
   async judged(first, choices) {
     const asked = JSON.stringify(choices);
     /** @type {string[]} */
     const models = JSON.parse(await first.call("models", asked));
-    // the slowest first: none of them is begun last
+    // the slowest models come first, so that none of them starts last
     const left = [...models].reverse();
     const judged = new Map();
     /** @type {Set<string>} */
@@ -128,7 +129,7 @@ const calibration = {
   }),
 };
 
-/** A calibration file that was dropped: its errors on the recordings, and its estimates. */
+/** A dropped calibration file: its errors on the recordings, and its estimates. */
 const evaluation = {
   run: () => tell.busy("evaluating", async () => {
     page.begin("evaluated");

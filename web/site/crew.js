@@ -1,11 +1,11 @@
 /*
- * Workers, each with the crates of stretch in it. They are made of the page's own text: a page that was opened from a disk
- * may load nothing.
+ * Workers, each with the compiled crates of stretch. They are created from the text of the page, because a page that was
+ * opened from a disk cannot load other files.
  */
 
 /** @typedef {{resolve: (value: any) => void, reject: (why: Error) => void}} Waiting */
 
-/** What workers were told to stop for. */
+/** Error of a call that was cancelled. */
 class Cancelled extends Error {}
 
 const parts = {
@@ -21,7 +21,7 @@ const parts = {
   worker: null,
 };
 
-/** The crates, unpacked once. */
+/** Returns the compiled crates, which are unpacked once. */
 const unpacked = () => {
   parts.module ??= (async () => {
     const packed = Uint8Array.from(atob(parts.text("wasm").trim()), (c) => c.charCodeAt(0));
@@ -31,16 +31,16 @@ const unpacked = () => {
   return parts.module;
 };
 
-/** One worker; it does one thing after the other. */
+/** One worker. It processes its calls one after the other. */
 class Hand {
-  /** @param {(text: string) => void} told Told what goes on. */
+  /** @param {(text: string) => void} told Called with progress messages. */
   constructor(told) {
     parts.worker ??= URL.createObjectURL(new Blob([parts.text("worker")], { type: "text/javascript" }));
     /** @type {Map<number, Waiting>} */
     this.waiting = new Map();
     this.calls = 0;
     this.isEnded = false;
-    /** Which files it has read, in which edition. @type {Map<string, number>} */
+    /** Files that it has read, each with the edition of the reading options. @type {Map<string, number>} */
     this.has = new Map();
     this.worker = new Worker(parts.worker);
     this.worker.onmessage = ({ data }) => {
@@ -52,7 +52,7 @@ class Hand {
     };
     this.worker.onerror = (event) => this.end(new Error(event.message || "a worker could not be started"));
     this.ready = unpacked().then((module) => this.ask("begin", module));
-    // whoever asks for something is told
+    // every call awaits `ready` and reports the error
     this.ready.catch(() => {});
   }
 
@@ -73,7 +73,7 @@ class Hand {
     });
   }
 
-  /** @param {Error} [why] Ends at once, whatever it does. */
+  /** @param {Error} [why] Ends the worker at once, also during a call. */
   end(why = new Cancelled("cancelled")) {
     this.isEnded = true;
     this.worker.terminate();

@@ -1,5 +1,5 @@
 /*
- * In a worker: what is asked is handed to the crates, and their answer, or their sentence, given back.
+ * Runs in a worker: passes calls to the crates, and returns their results or the sentences of their errors.
  */
 (() => {
   "use strict";
@@ -13,7 +13,7 @@
   here.stretchProgress = (/** @type {string} */ text) => here.postMessage({ progress: text });
   here.stretchFailed = (/** @type {string} */ text) => { fatal = text; };
 
-  /** What is not a method of the desk. @type {Record<string, (...args: any[]) => any>} */
+  /** Calls that are not methods of the class `Desk`. @type {Record<string, (...args: any[]) => any>} */
   const others = {
     begin(module) {
       wasm_bindgen.initSync({ module });

@@ -5,7 +5,7 @@
 /** @typedef {{sentence: string, notes: string[], seconds: number, candidates: Shown, caption: string, no_rig: string|null}} Told */
 
 const diagnosis = {
-  /** What was diagnosed. */
+  /** Title of the report: what was diagnosed. */
   title: "",
 
   run: () => tell.busy("preparing", async () => {

@@ -1,8 +1,8 @@
 /*
- * A board on a serial port: what it sends is decoded by a worker of its own, shown, and kept until it is saved.
+ * A board on a serial port: a separate worker decodes the data, which are drawn, and kept until they are saved.
  */
 
-/** Seconds that the plot shows. */
+/** Length of the plot, s. */
 const WINDOW_S = 20;
 /** Rows that are kept for the plot. */
 const MOST_ROWS = 20_000;
@@ -12,9 +12,9 @@ const live = {
   hand: null,
   /** @type {ReadableStreamDefaultReader<Uint8Array>|null} */
   reader: null,
-  /** Time, signal and estimate of what is shown. @type {[number, number, number][]} */
+  /** Rows of the plot: time, signal and estimate. @type {[number, number, number][]} */
   rows: [],
-  /** The recording: its header, and what came. @type {string[]} */
+  /** The recording: its header, then the received lines. @type {string[]} */
   lines: [],
   isDrawn: true,
 
@@ -46,7 +46,7 @@ const live = {
     }
   },
 
-  /** @param {SerialPort} port Listens until the port goes or is let go. */
+  /** @param {SerialPort} port Receives until the port disappears or is disconnected. */
   async listen(port) {
     if (!port.readable || !live.hand) throw new Error("the port cannot be read; is another program listening?");
     live.reader = port.readable.getReader();
@@ -97,7 +97,7 @@ const live = {
       live.reader.cancel().catch(() => {});
       return;
     }
-    // no port was chosen
+    // the user closed the dialog without choosing a port
     const isNone = (/** @type {any} */ error) => error?.name === "NotFoundError" || error instanceof Cancelled;
     live.begin().catch((error) => { if (!isNone(error)) tell.wrong(error); });
   },

@@ -1,18 +1,18 @@
 /*
- * What is dropped, read and shown; and which button does what.
+ * Reads dropped files, shows them, and connects the buttons to their functions.
  */
 
-/** Columns that say what was done, not what came of it. */
+/** Columns that are inputs of the rig, and therefore neither reference nor signal. */
 const COMMANDS = ["inlet", "outlet", "pressure_kpa", "excitation_share", "set_length_mm", "shunt_share"];
 /** Seed of the sample. */
 const SAMPLE = 1;
-/** Recordings whose rows are shown without being asked for. */
+/** Largest number of recordings for which the list is open at first. */
 const MOST_OPEN = 4;
-/** Points of the picture. */
+/** Largest number of points of the picture. */
 const MOST_POINTS = 1500;
 
 const page = {
-  /** @param {Map<string, File>} files Reads what was dropped beside what is there; a recording with other columns replaces the sample. */
+  /** @param {Map<string, File>} files Adds dropped files. If a recording has other columns than the sample, the files replace the sample. */
   async take(files) {
     await page.read(files);
     const columns = [...state.recordings.values()].map(({ name, columns }) => ({ name, names: columns.map((c) => c.name) }));
@@ -29,12 +29,12 @@ const page = {
   read: (files) => tell.busy("reading", async () => {
     page.changed("calibrated", "diagnosed", "evaluated");
     for (const [name, file] of files) {
-      // of several calibration files or rig files the last one counts
+      // added at the end, because the last of several calibration files or rig files is used
       state.files.delete(name);
       state.files.set(name, file);
       crew.hands.forEach((hand) => hand.has.delete(name));
     }
-    // a description comes first, so that others are read as it says
+    // dataset.toml and other TOML files come first, because they describe how the others are read
     const isFirst = (/** @type {string} */ name) => (name === "dataset.toml" ? 0 : name.endsWith(".toml") ? 1 : 2);
     const names = [...files.keys()].sort((a, b) => isFirst(a) - isFirst(b));
     const hand = crew.hand(CALIBRATOR);
@@ -95,7 +95,7 @@ const page = {
     await page.look();
   },
 
-  /** What each recording is for: a dataset.toml says so itself, else it is chosen here. */
+  /** Shows the use of each recording: fitting or testing. The user chooses it unless there is a dataset.toml. */
   uses() {
     const isSaid = state.files.has("dataset.toml");
     for (const row of html("list").querySelectorAll("tr")) {
@@ -124,7 +124,7 @@ const page = {
     if (names.includes(wanted)) select(id).value = wanted;
   },
 
-  /** Which columns are reference and signal: what was chosen before, the usual names, units. @param {About[]} all */
+  /** Chooses the columns of reference and signal: as before, or else by the usual names, units and words. @param {About[]} all */
   guess(all) {
     const columns = [...new Map(all.flatMap((a) => a.columns).map((c) => [c.name, c])).values()];
     const free = columns.filter((c) => !COMMANDS.includes(c.name) && !c.name.startsWith("estimate"));
@@ -145,19 +145,19 @@ const page = {
     rig.disabled = !isRig;
   },
 
-  /** Greys results of earlier choices. @param {string[]} ids */
+  /** Marks results as out of date, because the choices changed. @param {string[]} ids */
   changed: (...ids) => ids.forEach((id) => page.mark(id, true)),
 
-  /** @param {string} id Results of the present choices. */
+  /** @param {string} id Marks results as up to date. */
   fresh: (id) => page.mark(id, false),
 
-  /** Before results are computed again. @param {string} id */
+  /** Hides results before they are computed again. @param {string} id */
   begin(id) {
     html(id).hidden = true;
     if (report.of === id) report.close();
   },
 
-  /** What is stale is neither saved nor reported. @param {string} id @param {boolean} isStale */
+  /** Sets whether results are out of date; such results can neither be saved nor shown as a report. @param {string} id @param {boolean} isStale */
   mark(id, isStale) {
     html(id).classList.toggle("stale", isStale);
     for (const one of html(id).querySelectorAll("button")) one.disabled = isStale;
@@ -187,7 +187,7 @@ const page = {
     state.edition += 1;
     return page.take(new Map([...state.files, ...page.refused]));
   },
-  /** What could not be read: it may be, read otherwise. @type {Map<string, File>} */
+  /** Files that could not be read. They are read again with other options. @type {Map<string, File>} */
   refused: new Map(),
 
   clear() {
@@ -218,7 +218,7 @@ const page = {
   },
 };
 
-/** Files of what is dropped, folders opened: names are those inside the folder. */
+/** Collects the dropped files, including those in folders, with their paths in the folder as names. */
 const dropped = {
   /** @param {Entry} entry @param {string} path @param {Map<string, File>} into @returns {Promise<void>} */
   async walk(entry, path, into) {
@@ -247,7 +247,7 @@ const dropped = {
   async files(data) {
     /** @type {Map<string, File>} */
     const into = new Map();
-    // all asked at once: a moment later what was dropped is gone
+    // all entries are requested at once, because the browser clears the dropped data after this call
     const plain = [...data.files];
     const items = [...data.items].filter((item) => item.kind === "file");
     const entries = items.map((item) => /** @type {Entry|null} */ (/** @type {any} */ (item).webkitGetAsEntry?.() ?? null));
@@ -255,7 +255,7 @@ const dropped = {
       plain.forEach((file) => into.set(file.name, file));
       return into;
     }
-    // of a page from a disk Chromium gives a folder by its handle only, Firefox and Safari by its entry
+    // if the page was opened from a disk, Chromium gives access to a folder only by its handle, Firefox and Safari by its entry
     const handles = items.map((item) => /** @type {Promise<Handle>|undefined} */ (/** @type {any} */ (item).getAsFileSystemHandle?.()));
     for (const [i, entry] of entries.entries()) {
       const handle = await handles[i];
@@ -315,12 +315,12 @@ const dropped = {
   window.addEventListener("resize", report.fit);
   window.addEventListener("resize", () => { if (page.lines.length) plot.draw(part("look", HTMLCanvasElement), page.lines); });
   live.wire();
-  // the first worker begins with the page, so that the first file does not wait for it
+  // the first worker starts together with the page, so that the first file is read without delay
   const first = crew.hand(CALIBRATOR);
   first.ready.then(async ({ version, models }) => {
     html("version").textContent = version;
     page.options("model", ["auto", ...models], "auto");
-    /** @type {Record<string, string>} What a name alone does not say; a model that is not here remembers what the signal did. */
+    /** @type {Record<string, string>} Descriptions of the models. Models that are not listed have memory. */
     const words = { auto: "least error on trials left out", linear: "a line", poly13: "as published" };
     for (const option of select("model").options) {
       const rest = option.value.endsWith("+rest") ? ", follows drift" : "";

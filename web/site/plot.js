@@ -1,11 +1,11 @@
 /*
- * Lines over time on a canvas, one panel above the other, in the page's colours.
+ * Draws lines over time on a canvas, in panels one above the other, in the colours of the page.
  */
 
 /** @typedef {{name: string, ink: string, x: ArrayLike<number>, y: ArrayLike<number>}} Line */
 
 const plot = {
-  /** @param {number} span A step that a reader counts in. */
+  /** @param {number} span Returns a round step for the axis: 1, 2 or 5 times a power of ten. */
   step(span) {
     const rough = span / 4;
     const ten = 10 ** Math.floor(Math.log10(rough));
@@ -22,7 +22,7 @@ const plot = {
     return least <= greatest ? [least, greatest] : [0, 1];
   },
 
-  /** @param {HTMLCanvasElement} canvas @param {Line[]} lines Draws each in a panel of its own. */
+  /** @param {HTMLCanvasElement} canvas @param {Line[]} lines Draws each line in a separate panel. */
   draw(canvas, lines) {
     const [width, height, scale] = [canvas.clientWidth, canvas.clientHeight, window.devicePixelRatio || 1];
     canvas.width = Math.round(width * scale);

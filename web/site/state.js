@@ -1,5 +1,5 @@
 /*
- * What all parts of the page share: the files, who works, and what is told.
+ * State and functions that all parts of the page share: the files, the workers, and messages to the user.
  */
 
 /** @typedef {{name: string, unit: string, least: number, greatest: number}} Column */
@@ -19,27 +19,27 @@ const button = (/** @type {string} */ id) => part(id, HTMLButtonElement);
 const select = (/** @type {string} */ id) => part(id, HTMLSelectElement);
 const input = (/** @type {string} */ id) => part(id, HTMLInputElement);
 
-/** A number as a table shows it. @param {number|null|undefined} x @param {number} [digits] */
+/** Formats a number for a table. @param {number|null|undefined} x @param {number} [digits] */
 const shown = (x, digits = 4) =>
   x === null || x === undefined || !Number.isFinite(x) ? "–" : String(Number(x.toPrecision(digits))).replace("-", "−");
 
 const state = {
-  /** Files as they were dropped, by name. @type {Map<string, File>} */
+  /** Dropped files by name. @type {Map<string, File>} */
   files: new Map(),
-  /** Those that are read, in the order in which they came. @type {Map<string, About>} */
+  /** Recordings that were read, by name, in the order of their arrival. @type {Map<string, About>} */
   recordings: new Map(),
-  /** Names of those that are only tested on. @type {Set<string>} */
+  /** Names of the recordings that are used only for testing. @type {Set<string>} */
   held: new Set(),
-  /** How they are read, and how often that changed. */
+  /** Reading options, and how often they were changed. */
   asked: {},
   edition: 0,
-  /** The record that the live view uses, as JSON. */
+  /** Calibration file that the live view uses, as JSON. */
   record: "",
   /** The calibration file that was dropped last. @type {RecordAbout|null} */
   dropped: null,
 };
 
-/** Those who work: the first holds the calibration, the last the diagnosis, those between judge models. */
+/** Indices of the workers: the first makes the calibration, the last the diagnosis. Those between evaluate models. */
 const CALIBRATOR = 0;
 const DIAGNOSER = 8;
 const crew = {
@@ -56,10 +56,10 @@ const crew = {
     return (crew.hands[i] = new Hand((text) => tell.doing(text)));
   },
 
-  /** A hand that has read every file. @param {number} i */
+  /** Returns a worker that has read all files. @param {number} i */
   async stocked(i) {
     const hand = crew.hand(i);
-    // what says of the others how they belong together comes first
+    // dataset.toml and other TOML files come first, because they describe how the recordings belong together
     const isFirst = (/** @type {string} */ name) => (name === "dataset.toml" ? 0 : name.endsWith(".toml") ? 1 : 2);
     const names = [...state.files.keys()].sort((a, b) => isFirst(a) - isFirst(b));
     for (const name of names) {
@@ -79,13 +79,13 @@ const crew = {
     return about;
   },
 
-  /** Ends those who are at work; what others hold stays. */
+  /** Ends the workers that are busy. The results of the others are kept. */
   cancel() {
     [CALIBRATOR, DIAGNOSER].filter((i) => crew.hands[i]?.waiting.size).forEach((i) => crew.hands[i].end());
     crew.dismiss();
   },
 
-  /** Ends those who judge models. */
+  /** Ends the workers that evaluate models. */
   dismiss() {
     crew.hands.slice(CALIBRATOR + 1, DIAGNOSER).forEach((hand) => hand.end());
   },
@@ -104,7 +104,7 @@ const tell = {
     tell.announce(text);
   },
 
-  /** Says it to those who do not see the page. @param {string} text */
+  /** Announces a text to users of a screen reader. @param {string} text */
   announce(text) {
     html("announced").textContent = text;
   },
@@ -122,7 +122,7 @@ const tell = {
     if (error !== "") html("wrong").scrollIntoView({ block: "nearest" });
   },
 
-  /** Does something that takes its time; one thing at once. @param {string} what @param {() => Promise<void>} work */
+  /** Runs a long calculation and shows its progress. Only one runs at a time. @param {string} what @param {() => Promise<void>} work */
   async busy(what, work) {
     if (crew.isBusy) {
       tell.wrong("A calculation is running: wait for it, or cancel it.");
@@ -141,7 +141,7 @@ const tell = {
     }, 1000);
     try {
       await work();
-      // what was being done is not said to the end of time
+      // replace the last progress message, if it is still shown
       if (html("announced").textContent === html("doing").dataset.text) tell.announce("Done.");
     } catch (error) {
       if (error instanceof Cancelled) tell.cancelled();
@@ -198,13 +198,13 @@ const tell = {
   },
 };
 
-/** The report that is open. */
+/** The open report. */
 const report = {
-  /** The results that it is about. */
+  /** Id of the results that the report shows. */
   of: "",
   name: "",
   text: "",
-  /** What had the focus before. @type {Element|null} */
+  /** Element that had the focus before the report was opened. @type {Element|null} */
   opener: null,
 
   /** @param {string} of @param {string} name @param {string} title @param {string} text */
@@ -219,7 +219,7 @@ const report = {
     html("report-name").focus({ preventScroll: true });
   },
 
-  /** Makes the frame as long as what is in it, at every width: a phone has one thing to scroll. */
+  /** Sets the height of the frame to that of its content, so that only the page scrolls. */
   fit() {
     const frame = part("page", HTMLIFrameElement);
     const inside = frame.contentDocument?.documentElement;

@@ -1,7 +1,7 @@
-/** What wasm-bindgen puts above desk.js. */
+/** The code that wasm-bindgen generates; it precedes desk.js. */
 declare const wasm_bindgen: any;
 
-/** Web Serial, as far as it is used. */
+/** The part of Web Serial that the page uses. */
 interface SerialPort {
   open(options: { baudRate: number }): Promise<void>;
   close(): Promise<void>;
@@ -11,7 +11,7 @@ interface Navigator {
   readonly serial?: { requestPort(): Promise<SerialPort> };
 }
 
-/** Folders that are dropped. */
+/** Access to dropped folders. */
 interface DirectoryReader {
   readEntries(take: (entries: Entry[]) => void, fail: (why: unknown) => void): void;
 }

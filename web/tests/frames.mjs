@@ -1,5 +1,5 @@
 /*
- * What a board would send over the live link: 600 frames, one of them lost, one damaged, one sent twice.
+ * Prints the data of a simulated board on the live link: 600 frames, of which one is lost, one is damaged and one is sent twice.
  */
 
 /** CRC-32C of an ASCII text. */

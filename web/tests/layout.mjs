@@ -1,8 +1,8 @@
 /*
- * What a layout must not do, at any width and in any light.
+ * Checks of the layout, for any width, in light and in dark mode.
  */
 
-/** What a layout must not do, told in words; runs in the page. */
+/** Returns the faults of the layout in words. Runs in the page. */
 export const faults = () => {
   const said = [];
   const root = document.documentElement;
@@ -13,7 +13,7 @@ export const faults = () => {
     if (!cell.getClientRects().length) continue;
     if (cell.scrollWidth > cell.clientWidth + 1 && getComputedStyle(cell).display !== "inline") said.push(`clipped: ${named(cell)}`);
   }
-  // what scrolls in its own frame shows that it does; figures must not need to
+  // tables may scroll in a frame, but the text of a figure must fit into the figure
   for (const drawing of document.querySelectorAll("figure svg")) {
     if (!drawing.getClientRects().length) continue;
     const frame = drawing.getBoundingClientRect();
@@ -30,7 +30,7 @@ export const faults = () => {
       }
     }
   }
-  // letters on points cannot be read: a grid of places under each word
+  // text that covers points is illegible: test a grid of positions under each text
   for (const drawing of document.querySelectorAll("figure svg")) {
     if (!drawing.getClientRects().length) continue;
     const clouds = [...drawing.querySelectorAll("path.dots")];

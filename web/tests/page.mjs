@@ -1,10 +1,10 @@
 /*
- * The page end to end, in a browser: dropped, calibrated, saved, diagnosed, cancelled, refused; on a phone; live. What it saves is
- * compared with what the program writes of the same files.
+ * Tests the page in a browser: dropping files, calibration, saving, diagnosis, cancelling, refusals, the layout on a phone, and the
+ * live view. Saved files are compared with those that the program writes.
  * node page.mjs [--shots DIR] PAGE.html BENCH WANTED GOLDEN
- *   BENCH a data set, WANTED a folder with what the program made of it: poly13.json, observer.json, header/stretch.h, diagnosis.json;
- *   and of linked.txt, which a board sent: linked.csv, linked.told; of trials and a stream that make one doubt, what it said of them:
- *   doubted/*.csv, doubted/*.told, doubted.txt, doubted.told
+ *   BENCH is a data set. WANTED is a folder with results of the program: poly13.json, observer.json, header/stretch.h and
+ *   diagnosis.json for the data set; linked.csv and linked.told for linked.txt, the data of a board; and the messages *.told for
+ *   doubtful trials (doubted/*.csv) and a doubtful stream (doubted.txt).
  */
 import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { join, resolve } from "node:path";
@@ -18,7 +18,7 @@ const text = (path) => readFileSync(path, "utf8");
 
 const url = pathToFileURL(resolve(file)).href;
 
-/** A fresh page; whatever it asks for beyond itself, and whatever it complains of, is wrong. */
+/** Opens a new page. Any request to another address and any error message counts as wrong. */
 const opened = async (name, { width = 1280, scheme = "light", begin } = {}) => {
   const context = await browser.newContext({ viewport: { width, height: 844 }, colorScheme: scheme, reducedMotion: "reduce", acceptDownloads: true });
   const page = await context.newPage();
@@ -33,7 +33,7 @@ const opened = async (name, { width = 1280, scheme = "light", begin } = {}) => {
   await until(page, () => document.querySelector("#model option"), null, 60_000);
   return page;
 };
-/** Waits until a function of the page says yes; Playwright's own way needs a policy that lets strings run. */
+/** Waits until a function returns true in the page. Playwright's own function would need a content policy that allows eval. */
 const until = async (page, is, given, limit = 300_000) => {
   const end = performance.now() + limit;
   while (!(await page.evaluate(is, given))) {
@@ -46,7 +46,7 @@ const put = async (page, files) => {
   await page.setInputFiles("#choose", files);
   await idle(page);
 };
-/** Drops files or folders onto the page, as a hand does. */
+/** Drops files or folders onto the page, as a user does. */
 const drop = async (page, paths) => {
   const session = await page.context().newCDPSession(page);
   const data = { items: [], files: paths.map((path) => resolve(path)), dragOperationsMask: 1 };
@@ -71,7 +71,7 @@ const said = (page) => page.evaluate(() => {
 });
 const all = readdirSync(bench).map((name) => join(bench, name));
 
-/** The program's files come out of the page, to the last byte. */
+/** The files that the page saves equal those of the program byte for byte. */
 const same = async () => {
   const page = await opened("same");
   check(await page.evaluate(() => getComputedStyle(document.getElementById("recordings")).display) === "none", "nothing is shown before something is dropped");
@@ -119,7 +119,7 @@ const same = async () => {
   await page.context().close();
 };
 
-/** A stranger's way: the sample, the best model, a diagnosis that is cancelled and one of the gauge alone. */
+/** The steps of a new user: the sample, the best model, a cancelled diagnosis, and a diagnosis of the gauge alone. */
 const stranger = async () => {
   const page = await opened("stranger");
   await press(page, "sample");
@@ -130,7 +130,7 @@ const stranger = async () => {
   await press(page, "calibrate");
   check(await said(page) === "", `auto: ${await said(page)}`);
   check((await page.innerText("#fitted")).startsWith("Chosen: observer"), "auto chooses");
-  // the sample is the data set of the program's simulator, to the bit
+  // the sample equals the data set that the program simulates, bit for bit
   check((await saved(page, "save-record")).text === text(join(wanted, "observer.json")), "and fits what the program fits");
   const offered = await page.locator("#model option").count() - 1;
   const judged = await page.locator("#rows tr").count();
@@ -155,7 +155,7 @@ const stranger = async () => {
   await page.context().close();
 };
 
-/** Files that cannot be read are refused in the program's words, and the others stay. */
+/** Files that cannot be read are refused with the messages of the program, and the others are kept. */
 const refused = async () => {
   const page = await opened("refused");
   const file = (name, body) => ({ name, mimeType: "text/csv", buffer: Buffer.from(body) });
@@ -221,10 +221,10 @@ const refused = async () => {
   await page.context().close();
 };
 
-/** The doubts that the program printed on standard error, without the summary; its lines break at the width of a terminal. */
+/** Returns the doubts that the program printed on standard error, without the summary and without line breaks. */
 const toldBy = (name) => text(join(wanted, name)).replace(/^[\d,]+ samples: .*?(?=^stretch: |$(?![^]))/gms, "").replace(/^stretch: /gm, "\u0000").replace(/\s+/g, " ").replaceAll("stretch convert", "the program: stretch convert").split("\u0000").map((one) => one.trim()).filter(Boolean);
 
-/** What makes one doubt an evaluation is said in the program's words. */
+/** Doubts about an evaluation have the same words as in the program. */
 const doubted = async () => {
   const members = readdirSync(join(wanted, "doubted")).filter((name) => name.endsWith(".csv"));
   check(members.length > 6, `members: ${members.join(", ")}`);
@@ -242,7 +242,7 @@ const doubted = async () => {
   }
 };
 
-/** A calibration file is evaluated and applied as by the program, and a rig file is used or refused aloud. */
+/** A calibration file is evaluated and applied as in the program. A note says whether a rig file is used. */
 const used = async () => {
   const page = await opened("used");
   await put(page, [join(wanted, "poly13.json"), join(bench, "arbitrary_1.csv")]);
@@ -268,7 +268,7 @@ const used = async () => {
   await page.context().close();
 };
 
-/** Layout and contrast, from a phone to a desk. */
+/** Layout and contrast, at the widths of a phone and of a desktop. */
 const looks = async () => {
   for (const [width, scheme] of [[390, "light"], [390, "dark"], [1280, "light"], [1280, "dark"]]) {
     const name = `page ${width} ${scheme}`;
@@ -292,7 +292,7 @@ const looks = async () => {
   }
 };
 
-/** A port that sends what a test says. */
+/** Replaces the serial port by one that sends the data of a test. */
 const port = () => {
   const sent = { push: null, close: null };
   window.testPort = sent;
@@ -311,7 +311,7 @@ const live = async () => {
     await until(page, () => window.testPort.push !== null);
   };
   const send = async (body) => {
-    // in pieces that end anywhere, as a port gives them
+    // in pieces that end anywhere, as from a real port
     for (let i = 0; i < body.length; i += 777) await page.evaluate((piece) => window.testPort.push(piece), body.slice(i, i + 777));
   };
   await connect("numbers");
@@ -336,8 +336,7 @@ const live = async () => {
   await disconnect();
   await connect("frames");
   await send(text(join(wanted, "linked.txt")));
-  // what the program said of them
-  // a terminal's width says where the program's lines break
+  // the program breaks its lines at the width of the terminal, so line breaks are removed
   const [counts, , missing] = text(join(wanted, "linked.told")).replace(/\n(?=\S)/g, " ").split(";");
   const told = `${counts};${missing}`;
   await until(page, (all) => document.getElementById("link").textContent.startsWith(all), told, 20_000)
@@ -346,7 +345,7 @@ const live = async () => {
   await page.context().close();
 };
 
-/** The receptors answer as on a desk and on boards, bit by bit. */
+/** The receptors give the same bits as on a computer and on boards. */
 const bits = async () => {
   const page = await opened("bits");
   const found = await page.evaluate(() => crew.hand(CALIBRATOR).call("golden"));
@@ -354,7 +353,7 @@ const bits = async () => {
   await page.context().close();
 };
 
-/** How long a million rows take. */
+/** Measures the time for a million rows. */
 const fast = async () => {
   const page = await opened("fast");
   const log = join(mkdtempSync(join(tmpdir(), "page-")), "long.csv");

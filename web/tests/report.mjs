@@ -1,5 +1,5 @@
 /*
- * Opens reports in a browser, at the width of a phone and of a desk, in light and dark, and touches them.
+ * Opens reports in a browser, at the widths of a phone and of a desktop, in light and dark mode, and uses their figures.
  * node report.mjs [--shots DIR] REPORT.html ...
  */
 import { basename, resolve } from "node:path";
@@ -7,7 +7,7 @@ import { pathToFileURL } from "node:url";
 import { faults } from "./layout.mjs";
 import { browser, check, ended, named, shots } from "./support.mjs";
 
-/** Two fingers that part, as the browser's own touch input sends them. */
+/** Sends a pinch gesture (two fingers that move apart) through the touch input of the browser. */
 const pinched = async (page, plot, size, name) => {
   const device = await page.context().newCDPSession(page);
   await plot.scrollIntoViewIfNeeded();
@@ -25,7 +25,7 @@ const pinched = async (page, plot, size, name) => {
   await page.keyboard.press("0");
 };
 
-/** @param {import("playwright-core").Page} page Touches the figures and looks at what they do. */
+/** @param {import("playwright-core").Page} page Uses the figures and checks their reactions. */
 const touched = async (page, name) => {
   await page.evaluate(() => document.querySelectorAll("details").forEach((details) => { details.open = true; }));
   const plot = page.locator("svg.live[data-from]").first();
@@ -126,8 +126,7 @@ for (const report of named) {
     await page.goto(url);
     if (shots) await page.screenshot({ path: `${shots}/${name.replaceAll(" ", "-")}.png`, fullPage: true });
     check(await page.evaluate(() => document.documentElement.classList.contains("answers")), `${name}: the script runs`);
-    // the first picture of each part begins in the window that its headline begins, but where the tables are what was asked for: the paper's
-    // figures beside ours, and scores
+    // the first picture of each part is visible together with the headline, except on pages whose main content is a table
     const isOfTables = /paper|challenge/.test(report);
     const begins = await page.evaluate(() => [...document.querySelectorAll("header")].map((header) => {
       const after = [...document.querySelectorAll("figure svg")].filter((svg) => svg.getClientRects().length

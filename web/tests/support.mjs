@@ -1,5 +1,5 @@
 /*
- * What the tests in a browser share: the browser, what they are asked for, and what they count as wrong.
+ * Code that the browser tests share: the browser, the command line, and the count of faults.
  */
 import { chromium } from "playwright-core";
 import { mkdirSync } from "node:fs";
@@ -10,26 +10,26 @@ const FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking
 const words = process.argv.slice(2);
 const at = words.indexOf("--shots");
 
-/** The folder for pictures, where there is one. */
+/** The folder for screenshots, if one is given. */
 export const shots = at < 0 ? null : words.splice(at, 2)[1];
 if (shots) mkdirSync(shots, { recursive: true });
 
-/** What is said beside options. */
+/** The arguments without options. */
 export const named = words;
 
-/** A browser without anything that asks the network. */
+/** A browser whose background services that use the network are off. */
 export const browser = await chromium.launch({ executablePath: process.env.CHROMIUM || "/usr/bin/chromium", headless: true, args: FLAGS });
 
 let wrong = 0;
 
-/** Says and counts what is not as it should be. */
+/** Prints and counts a fault unless a condition holds. */
 export const check = (good, what) => {
   if (good) return;
   wrong += 1;
   console.log(`WRONG ${what}`);
 };
 
-/** Closes the browser; the status says whether anything was wrong. */
+/** Closes the browser. The exit status is 1 if there was a fault. */
 export const ended = async () => {
   await browser.close();
   console.log(wrong ? `${wrong} wrong` : "nothing wrong");

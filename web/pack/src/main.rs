@@ -1,4 +1,4 @@
-//! Puts the page into one file: HTML, style, scripts, and the WASM in it, packed.
+//! Packs the page into one file: HTML, style, scripts, and compressed WASM.
 //!
 //! `stretch-pack PAGE.wasm SOURCES OUT` writes `OUT/index.html` from `SOURCES/index.html`, whose
 //! lines `<!-- style FILE -->`, `<!-- script FILE ... -->`, `<!-- worker FILE ... -->`, `<!-- wasm
@@ -11,7 +11,7 @@ use base64::{Engine as _, engine::general_purpose::STANDARD};
 use flate2::{Compression, write::GzEncoder};
 use wasm_bindgen_cli_support::Bindgen;
 
-// one way to write policies, that of the reports
+// the reports and the page share the code that writes content policies
 #[path = "../../../crates/stretch-report/src/script.rs"]
 #[allow(dead_code)]
 mod script;
@@ -62,8 +62,8 @@ fn main() -> Outcome<()> {
     Ok(())
 }
 
-/// The content policy: the scripts with these digests, WASM, workers made from the page's own text,
-/// and nothing else; no request.
+/// Returns the content policy. It allows the scripts with these digests, WASM, and workers created
+/// from the text of the page, and forbids everything else, including requests.
 fn policy(digests: &[String]) -> String {
     format!(
         "default-src 'none'; script-src {} 'wasm-unsafe-eval'; style-src 'unsafe-inline'; worker-src blob:; frame-src blob:; \
@@ -72,7 +72,7 @@ fn policy(digests: &[String]) -> String {
     )
 }
 
-/// The module, and the JavaScript that wasm-bindgen generates for it.
+/// The WASM module, and the JavaScript that wasm-bindgen generates for it.
 struct Glue {
     js: String,
     wasm: Vec<u8>,
@@ -92,7 +92,7 @@ impl Glue {
     }
 }
 
-/// Files one after the other.
+/// Concatenates files.
 fn joined(sources: &Path, files: &[&str]) -> Outcome<String> {
     let mut text = String::new();
     for file in files {
@@ -101,7 +101,7 @@ fn joined(sources: &Path, files: &[&str]) -> Outcome<String> {
     checked(text)
 }
 
-/// A text that may be the content of an element.
+/// Checks that a text can be the content of an element.
 fn checked(text: String) -> Outcome<String> {
     match text.contains("</script") || text.contains("<!--") {
         true => Err("a script holds what ends an element".into()),

@@ -1,5 +1,5 @@
-//! Checks that the browser computes the same bits as a computer and boards: every receptor of
-//! `firmware/` replays the trial that boards replay.
+//! Checks that the browser computes the same bits as a computer and as boards. Every receptor (live
+//! estimator) of `firmware/` replays the same trial as the boards.
 
 use std::fmt::Write;
 
@@ -71,7 +71,7 @@ pub(crate) fn checksums() -> Result<String, Said> {
     volts(&mut out, "linear-f32-volts", StretchReceptor::with_rate(&linear, sg)?);
     let rate = IntegerSgRate::<11, 2>::new(hz, 3.3)?;
     volts(&mut out, &named("volts-integer"), StretchReceptor::with_rate(&poly13, rate)?);
-    // the calibration was fitted with another estimator; the board runs these for their cost
+    // the calibration was fitted with another estimator; boards run these estimators only to measure their cost
     let with = |rate_estimator| {
         Calibration::new(CalibrationSpec { rate_estimator, ..poly13.clone().into_spec() })
     };

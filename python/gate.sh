@@ -1,8 +1,7 @@
 #!/usr/bin/env bash
-# The gate of the Python package, the same on a desk and in CI: lints, a wheel built and installed into a fresh
-# environment, its tests, its types, and the notebook from top to bottom. It says SKIPPED and why where there is no Python.
-# PYTHON names another interpreter, PROFILE another profile than dev. MODULE names a module that is built already: it is
-# then tested instead of a wheel.
+# Lints and tests the Python package: builds a wheel, installs it into a fresh environment, runs the tests, checks the types,
+# and runs the notebook. Without Python, prints SKIPPED and the reason. PYTHON names another interpreter than python3, PROFILE
+# another profile than dev. If MODULE names a module that is already built, that module is tested instead of a wheel.
 set -euo pipefail
 cd "$(dirname "$0")"
 

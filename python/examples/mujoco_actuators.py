@@ -1,13 +1,13 @@
-"""Seven things that actuators do, hidden in turn in a MuJoCo arm, and named.
+"""Diagnosis of a MuJoCo arm that contains, in turn, each of seven effects of its actuators.
 
     pip install . mujoco[sysid]
     python examples/mujoco_actuators.py [--out ../reference/mujoco.md] [--only backlash]
 
-The simulator is a two-link arm under position control. Each of seven effects of an actuator catalogue is put into a copy of it,
-in another form than the catalogue knows (a friction with a Stribeck rise, a gear with a rotor behind it ...), together with other
-masses and gains and with noise. Asked is which effect is missing; next to the diagnosis are plain fitting by least RMSE, one
-candidate after the other, and `mujoco.sysid`, which fits all at once. In two more cases nothing is missing, and something is
-that the catalogue does not have.
+The simulator is a two-link arm under position control. A copy of the arm, with other masses and gains and with noise, takes the
+place of the real machine. In seven cases the copy has one effect of the catalogue, with other equations than the catalogue's (for
+example friction with a Stribeck rise, or a gear with the inertia of the rotor). In one case the copy has no effect, and in one
+case an effect that is not in the catalogue. Three methods have to find the effect: the diagnosis, a fit of one candidate after
+the other by least RMSE, and `mujoco.sysid`, which fits all candidates at once.
 """
 
 import argparse
@@ -45,14 +45,14 @@ MODEL = """
 
 DT_S = 0.002
 EVERY = 5
-"""Steps of integration between two samples: the joints are recorded at 100 Hz."""
+"""Integration steps per sample. The joints are recorded at 100 Hz."""
 SECONDS = 20.0
 NOISE_RAD = 2e-4
 SIZE = (1.0, 0.3)
-"""The elbow's motor is smaller than the shoulder's: torques, inertias and frictions by this factor."""
+"""Factor of the torques, inertias and frictions of each joint. The motor of the elbow is smaller than that of the shoulder."""
 GAINS = ((60.0, 3.0), (20.0, 0.6))
 NO_LOAD = 12.0
-"""Speed at which the motor has no torque left, rad/s."""
+"""No-load speed of the motors, rad/s: the speed at which their torque is zero."""
 
 PARAMETERS = {
     "tool_mass": stretch_gap.Parameter(0.3, relative=0.1, unit="kg"),
@@ -73,7 +73,7 @@ OFF = {name: argument.off for name, argument in CATALOGUE.items()}
 
 
 def commands():
-    """Where both joints are asked to be, rad, and how fast, rad/s, at every step."""
+    """Return the commanded positions, rad, and speeds, rad/s, of both joints at every step."""
     time_s = np.arange(0.0, SECONDS, DT_S)
     position, speed = np.zeros((2, time_s.size)), np.zeros((2, time_s.size))
     waves = [
@@ -93,13 +93,13 @@ STEPS = COMMAND.shape[1]
 
 
 def arm(tool_mass):
-    """The model with another tool."""
+    """Return the model with another mass of the tool, and its data."""
     model = mujoco.MjModel.from_xml_string(MODEL.replace('size="0.02" mass="0.3"', f'size="0.02" mass="{tool_mass}"'))
     return model, mujoco.MjData(model)
 
 
 def run(model, data, law, link):
-    """Both joints at every sample, rad. `law(i, joint, q, v)` is the torque of the motor, `link` what reaches the link."""
+    """Return the positions of both joints at every sample, rad. `link(i, joint, q, v, law)` returns the torque on the link."""
     rows = np.empty((2, STEPS // EVERY))
     q, v, out, step = data.qpos, data.qvel, data.qfrc_applied, mujoco.mj_step
     q[0], q[1] = COMMAND[0, 0], COMMAND[1, 0]
@@ -113,18 +113,18 @@ def run(model, data, law, link):
 
 
 class Simulator:
-    """The arm as its maker has it, with the catalogue in: every effect off unless it is asked for."""
+    """Simulator of the arm with the effects of the catalogue. Each effect is off at its off-value."""
 
     def __init__(self):
         self.runs = 0
 
     def simulate(self, params, effects):
-        """Both joints of n arms."""
+        """Return the positions of both joints for n models."""
         answers = [self.one(row, {name: effects[name][i] for name in CATALOGUE}) for i, row in enumerate(np.asarray(params))]
         return {"shoulder_rad": np.array([t[0] for t in answers]), "elbow_rad": np.array([t[1] for t in answers])}
 
     def one(self, params, e):
-        """Both joints of one arm."""
+        """Return the positions of both joints for one model."""
         self.runs += 1
         tool_mass, kp, kv = params
         model, data = arm(tool_mass)
@@ -139,11 +139,11 @@ class Simulator:
 
         def link(i, joint, q, v, law):
             size = SIZE[joint]
-            # the motor's side of a gear that is slack runs ahead of the link to the side to which it pushes
+            # with backlash, the motor side of the gear leads the link in the direction of the torque
             seen = q + ahead[joint]
             gain, rate = GAINS[joint]
             torque = kp * gain * (COMMAND[joint, i] - seen) + kv * rate * (COMMAND_SPEED[joint, i] - v)
-            # a soft gear gives way in proportion to the torque, which is less for it
+            # a compliant gear twists in proportion to the torque, which reduces the torque of the controller
             torque /= 1.0 + kp * gain * soft / size
             if e["stall_torque"] < OFF["stall_torque"]:
                 most = size * e["stall_torque"]
@@ -162,7 +162,7 @@ class Simulator:
 
 @dataclass
 class Hidden:
-    """What is in the arm that was built."""
+    """Effect and parameters of the copy that takes the place of the real arm."""
 
     kind: str
     size: float
@@ -189,7 +189,7 @@ CASES = [
 
 
 def built(case, seed):
-    """What was measured of the arm that was built."""
+    """Return the measured positions of the copy in a case, with noise."""
     model, data = arm(case.tool_mass)
     rotor = [[COMMAND[0, 0], 0.0], [COMMAND[1, 0], 0.0]]
     sent = ([0.0] * 8, [0.0] * 8)
@@ -200,7 +200,7 @@ def built(case, seed):
         return case.kp * gain * (COMMAND[joint, i] - q) + case.kv * rate * (COMMAND_SPEED[joint, i] - v)
 
     def geared(i, joint, q, v, size):
-        """A separate rotor and what the gear carries to the link."""
+        """Return the torque that the gear transmits to the link. The rotor is simulated separately."""
         inner, dt = 4, DT_S / 4
         angle, speed = rotor[joint]
         inertia, k = case.rotor * size, case.stiffness * size
@@ -233,7 +233,7 @@ def built(case, seed):
             sent[joint].append(bus[joint])
             torque = sent[joint][-1 - round(0.004 / DT_S)]
         elif case.kind == "stall_torque":
-            drive = v if torque > 0.0 else -v  # above 0 where the motor pushes the way it turns
+            drive = v if torque > 0.0 else -v  # positive if the torque acts in the direction of motion
             most = size * case.size * (1.0 - np.sign(drive) * (drive / NO_LOAD) ** 2)
             torque /= (1.0 + abs(torque / most) ** 8) ** 0.125
         elif case.kind == "cogging":
@@ -246,7 +246,7 @@ def built(case, seed):
 
 
 def diagnosed(measured):
-    """What the diagnosis says, and its models."""
+    """Return the diagnosis, and the number of models that it simulated."""
     stages = [
         stretch_gap.Stage("shoulder_rad", name="shoulder", noise=NOISE_RAD),
         stretch_gap.Stage("elbow_rad", name="elbow", noise=NOISE_RAD),
@@ -266,18 +266,21 @@ def diagnosed(measured):
 
 
 FITTED = int(0.75 * (STEPS // EVERY))
-"""Samples that the others may fit; the diagnosis holds the last quarter back, too."""
+"""Number of samples that the other methods may fit. The diagnosis, too, reserves the last quarter for tests."""
 
 
 def residual(measured, x, names, simulator):
-    """Simulated minus measured, of the samples that may be fitted, in noise."""
+    """Return simulated minus measured, divided by the noise, for the samples that may be fitted."""
     values = dict(zip(names, x[len(PARAMETERS) :]))
     rows = simulator.one(x[: len(PARAMETERS)], {**OFF, **values})
     return ((rows - measured)[:, :FITTED] / NOISE_RAD).ravel()
 
 
 def start_and_bounds(names):
-    """Parameters within three tolerances, candidates within their ranges, begun a fifth of the way in."""
+    """Return start values and bounds: parameters within three tolerances, candidates within their ranges.
+
+    Each candidate starts at a fifth of its range, counted from its off-value.
+    """
     values = [p.value for p in PARAMETERS.values()]
     reach = [3.0 * p.relative * p.value for p in PARAMETERS.values()]
     own = [CATALOGUE[name] for name in names]
@@ -288,7 +291,7 @@ def start_and_bounds(names):
 
 
 def least_rmse(measured):
-    """Every candidate fitted alone with the parameters: the one that leaves the least."""
+    """Fit every candidate alone together with the parameters, and return the one with the least RMSE."""
     from scipy.optimize import least_squares
 
     left = {}
@@ -306,7 +309,7 @@ def least_rmse(measured):
 
 
 def sysid(measured):
-    """All of it at once by `mujoco.sysid`: candidates whose 95 % interval leaves out the value at which they do nothing."""
+    """Fit all at once with `mujoco.sysid`, and return the candidates whose 95 % interval excludes the off-value."""
     import mujoco.sysid
 
     names = list(CATALOGUE)
@@ -319,7 +322,7 @@ def sysid(measured):
 
     def left(u, _, **__):
         u = np.asarray(u)
-        if u.ndim > 1:  # the optimiser asks for several at once, a column each
+        if u.ndim > 1:  # the optimiser requests several models at once, one per column
             rows = [residual(measured, column * scale, names, simulator) for column in u.T]
             return [np.stack(rows, axis=1)], None, None
         return [residual(measured, u * scale, names, simulator)], None, None
@@ -335,7 +338,7 @@ def sysid(measured):
 
 
 def row(case, with_others):
-    """One line of the table."""
+    """Return the cells of one row of the table, and whether the diagnosis is right."""
     measured = built(case, seed=11)
     begun = time.monotonic()
     found, runs = diagnosed(measured)
@@ -363,10 +366,10 @@ OTHERS = ["least RMSE, alone (left)", "`mujoco.sysid`, all at once (left)", "the
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", help="where the table goes, as Markdown")
-    parser.add_argument("--only", help="one case by name")
-    parser.add_argument("--alone", action="store_true", help="without the other methods")
-    parser.add_argument("--jobs", type=int, default=None, help="cases at once [default: one a processor]")
+    parser.add_argument("--out", help="Markdown file for the table")
+    parser.add_argument("--only", help="run only the case with this name")
+    parser.add_argument("--alone", action="store_true", help="run only the diagnosis, without the other methods")
+    parser.add_argument("--jobs", type=int, default=None, help="cases that run in parallel [default: one per processor]")
     args = parser.parse_args()
     cases = [case for case in CASES if args.only in (None, case.kind)]
     with ProcessPoolExecutor(args.jobs) as pool:
@@ -383,10 +386,11 @@ def main():
 
 
 ABOUT = f"""Made by `python/examples/mujoco_actuators.py --out reference/mujoco.md` with MuJoCo {mujoco.__version__}. A two-link
-arm under position control; both joints are recorded at 100 Hz for {SECONDS:.0f} s with noise of {NOISE_RAD} rad. Tool and gains
-of the arm that was built are others than the simulator's, within their tolerances. Each effect is hidden in another form than
-the catalogue knows. "Left" is root mean square in noise: 1 is noise alone. `mujoco.sysid` is given all parameters and all seven
-candidates at once; listed are those whose 95 % interval leaves out the value at which they do nothing.
+arm under position control; both joints are recorded at 100 Hz for {SECONDS:.0f} s with noise of {NOISE_RAD} rad. A copy of the arm
+takes the place of the real machine; its tool and gains differ from the simulator's, within their tolerances. The equations of
+each hidden effect differ from the catalogue's. "Left" is the RMS error in multiples of the noise: noise alone gives 1.
+`mujoco.sysid` fits all parameters and all seven candidates at once; the table lists the candidates whose 95 % interval excludes
+the value at which they have no effect.
 """
 
 

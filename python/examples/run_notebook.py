@@ -10,7 +10,7 @@ import sys
 
 
 def run(path):
-    """Runs every cell in one namespace; the last expression of a cell is shown as a notebook would."""
+    """Runs all cells in one namespace, and prints the value of the last expression of each cell, as a notebook does."""
     with open(path, encoding="utf-8") as file:
         cells = [c for c in json.load(file)["cells"] if c["cell_type"] == "code"]
     names = {"__name__": "__main__"}

@@ -1,8 +1,8 @@
-"""An environment with `reset` and `step`, as Gymnasium has them, with a recording: a simulator in ten lines.
+"""A simulator in ten lines, made from an environment with the methods `reset` and `step` of Gymnasium.
 
     python examples/step_function.py
 
-The environment here is a cart that is pushed; the recording is of a cart that also rubs.
+The environment is a cart that is driven by a force. The recording is of a cart that also has Coulomb friction.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ import stretch_gap
 
 
 class Cart:
-    """What Gymnasium calls an environment: `step(action)` gives observation, reward, two flags, and more."""
+    """Environment as in Gymnasium: `step(action)` returns observation, reward, two flags and a dict."""
 
     def __init__(self, mass=10.0, viscous=4.0, dry=0.0):
         self.mass, self.viscous, self.dry = mass, viscous, dry
@@ -26,8 +26,10 @@ class Cart:
 
 
 def stepped(make, action, observed=0):
-    """The simulator of an environment: `make(**parameters)` gives it, `action` is the column that drives it, and one number
-    of what it observes is compared with the measurement."""
+    """Return the simulator of the environment that `make(**parameters)` creates.
+
+    `action` is the column that drives the environment. Number `observed` of its observation is compared with the measurement.
+    """
 
     def simulate(params, effects, inputs, trials):
         out = []

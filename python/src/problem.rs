@@ -62,7 +62,7 @@ fn session_trial((recording, start_s, is_test): &Entry<'_>) -> SessionTrial {
 #[derive(Debug)]
 pub(crate) struct Entries {
     checked: Checked,
-    /// The recordings as they came.
+    /// The recordings before they are placed on the grid.
     trials: Vec<SessionTrial>,
     /// The file that the problem was read from.
     file: Option<ProblemSpec>,
@@ -101,7 +101,7 @@ type PyAnswer<'py> = (
 
 #[pymethods]
 impl Entries {
-    /// From the entries of a problem as JSON, and its recordings.
+    /// Creates a problem from the entries of its file as JSON, and its recordings.
     #[new]
     fn new(entries: &str, recordings: Vec<Entry<'_>>) -> PyResult<Self> {
         let entries: serde_json::Value = serde_json::from_str(entries).map_err(said)?;
@@ -110,7 +110,7 @@ impl Entries {
         Self::of(spec, None)
     }
 
-    /// From a problem.toml; `is_driven` says whether altered inputs can drive the simulator.
+    /// Reads a `problem.toml`. `is_driven` says whether altered inputs can drive the simulator.
     #[staticmethod]
     fn read(path: PathBuf, is_driven: bool) -> PyResult<Self> {
         let file = ProblemSpec::read(&path).map_err(said)?;

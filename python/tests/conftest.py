@@ -1,4 +1,4 @@
-"""Recordings that are made here: a joint, and a gauge on it that lags a little and is noisy."""
+"""Simulated recordings of a joint, and of a noisy gauge on it with a delay of 50 ms."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ RATE_HZ = 100.0
 
 
 def recording(seed, speed=1.0, seconds=20.0):
-    """Gauge, V, and angle, degrees."""
+    """Return the gauge's signal, V, and the angle, degrees."""
     draw = np.random.default_rng(seed)
     time_s = np.arange(0.0, seconds, 1.0 / RATE_HZ)
     phase = speed * (time_s + 0.4 * np.sin(0.37 * time_s))

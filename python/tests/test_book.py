@@ -1,4 +1,4 @@
-"""The Python of the README and of the book runs from top to bottom, each page in an empty folder."""
+"""The Python code of the README and of the book runs from top to bottom, for each page in an empty folder."""
 
 import re
 from pathlib import Path

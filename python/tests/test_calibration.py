@@ -26,7 +26,7 @@ def test_errors_are_those_of_the_estimates(tested, poly13):
     estimate = poly13.apply(signal, RATE_HZ)
     known = np.isfinite(estimate.value)
     rmse = np.sqrt(np.mean((estimate.value - angle)[known] ** 2))
-    # both are sums of the same squares, added in another order
+    # the same squares are added in another order
     assert poly13.evaluate(signal, angle, RATE_HZ).rmse == pytest.approx(rmse, rel=1e-12)
     assert 0 < np.count_nonzero(~known) < 20  # the rate estimator warms up on eleven samples
 
@@ -43,7 +43,7 @@ def test_a_record_survives_as_text_as_file_and_as_pickle(tmp_path, tested, poly1
         assert copy == poly13
         np.testing.assert_array_equal(copy.apply(tested[0]).value, value)
     poly13.save(tmp_path / "c.postcard")
-    # bytes for a board: only JSON holds the checksums of the trials
+    # the binary format does not hold the checksums of the trials; JSON does
     short = stretch_gap.Calibration.load(tmp_path / "c.postcard")
     np.testing.assert_array_equal(short.apply(tested[0]).value, value)
     short.save(tmp_path / "again.postcard")

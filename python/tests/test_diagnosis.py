@@ -12,7 +12,7 @@ RATE_HZ = 100.0
 
 
 def load(seconds=60.0):
-    """Force on a spring, N."""
+    """Return the force on a spring, N."""
     time_s = np.arange(0.0, seconds, 1.0 / RATE_HZ)
     return 20.0 * np.sin(1.3 * time_s) + 10.0 * np.sin(3.1 * time_s + 0.4)
 
@@ -23,11 +23,11 @@ def noise(samples, seed=0):
 
 FORCE = load()
 STIFFER = 2.1 * FORCE
-"""The spring is softer than its data sheet says."""
+"""Length of the spring. Its compliance of 2.1 is larger than that of the simulator, 2.0."""
 
 
 class Spring:
-    """A straight line, and a bend that is off."""
+    """A linear spring, with a nonlinear term as an effect that is off by default."""
 
     def __init__(self):
         self.asked = []
@@ -200,7 +200,7 @@ def test_curves_are_those_of_the_simulator(bent):
     np.testing.assert_array_equal(curves["measured"], BENT)
     np.testing.assert_array_equal(curves["as_shipped"], 2.0 * FORCE)
     fitted = bent.parameters["compliance"] * FORCE + bent.effects["bend"]["bend"] * FORCE**2
-    # the same two numbers, multiplied and added in the same way
+    # both compute the same expression
     np.testing.assert_allclose(curves["with_effects"], fitted, rtol=1e-9, atol=1e-9)
 
 
@@ -251,7 +251,7 @@ def test_a_simulator_that_takes_inputs_is_driven_by_altered_ones():
 
 
 def test_a_simulator_that_takes_the_first_values_is_called_once_a_recording():
-    """A damped spring that starts elsewhere in each recording: begun at rest, the starts would look like an effect."""
+    """A damped spring starts at another length in each recording. A simulation from rest would show a false effect."""
     parts = [(slice(0, 2500), 5.0), (slice(2500, FORCE.size), -40.0)]
     lengths_seen, starts_seen = set(), set()
 

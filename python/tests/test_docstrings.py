@@ -1,4 +1,4 @@
-"""Public docstrings are complete: every parameter of a public function is described, and the examples run."""
+"""Tests that public docstrings describe every parameter of a public function, and that their examples run."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MODULES = sorted(
 NATIVE = [
     name for name in stretch_gap.__all__ if name != "__version__" and getattr(stretch_gap, name) is getattr(_stretch, name, None)
 ]
-"""Names whose docstrings for editors and for the reference are in `_stretch.pyi`."""
+"""Names of the native module. Their docstrings for editors and for the reference are in `_stretch.pyi`."""
 STUB = {
     node.name: node
     for node in ast.parse((PACKAGE / "_stretch.pyi").read_text(encoding="utf-8")).body
@@ -34,7 +34,7 @@ STUB = {
 
 
 def public() -> Iterator[tuple[str, object]]:
-    """Public classes and functions that are written in Python, with their names."""
+    """Yield public classes and functions that are written in Python, with their names."""
     for module in (stretch_gap, stretch_gap.mujoco):
         for name in module.__all__:
             if name not in NATIVE and name != "__version__":
@@ -42,7 +42,7 @@ def public() -> Iterator[tuple[str, object]]:
 
 
 def functions() -> Iterator[tuple[str, object]]:
-    """Public functions, and public methods of public classes, with their names."""
+    """Yield public functions, and public methods of public classes, with their names."""
     for name, item in public():
         if inspect.isfunction(item):
             yield name, item
@@ -54,7 +54,7 @@ def functions() -> Iterator[tuple[str, object]]:
 
 
 def described(docstring: str, *sections: str) -> dict[str, str]:
-    """Names in sections of a numpydoc docstring, with their descriptions."""
+    """Return the names in sections of a numpydoc docstring, with their descriptions."""
     lines, found, names, inside = inspect.cleandoc(docstring).splitlines(), {}, [], False
     for line, below in zip(lines, [*lines[1:], ""]):
         if re.fullmatch(r"-{3,}", below):
@@ -68,7 +68,7 @@ def described(docstring: str, *sections: str) -> dict[str, str]:
 
 
 def missing(docstring: str, signature: list[str], *sections: str) -> list[str]:
-    """Errors in the descriptions of parameters."""
+    """Return the errors in the descriptions of parameters."""
     found = described(docstring, *sections)
     errors = [f"{name} is not described" for name in signature if not found.get(name)]
     return errors + [f"{name} is described, but is not a parameter" for name in found if name not in signature]
@@ -99,7 +99,7 @@ def test_every_parameter_of_a_public_function_is_described(name):
 @pytest.mark.parametrize("name", [name for name, item in PUBLIC.items() if inspect.isclass(item)])
 def test_classes_properties_and_fields_are_described(name):
     item = PUBLIC[name]
-    # a data class without a docstring gets its signature as one
+    # Python sets the docstring of a data class without one to its signature
     assert item.__doc__ and not item.__doc__.startswith(f"{item.__name__}("), f"{name} has no docstring"
     for member, value in vars(item).items():
         if isinstance(value, property):
@@ -125,7 +125,7 @@ def test_the_stub_describes_what_is_native(name):
             assert docstring, f"{name}.{node.name} has no docstring"
             parameters = [argument.arg for argument in node.args.args if argument.arg != "self"]
             assert missing(docstring, parameters, "Parameters") == []
-            # the stub has what the module has, and `help` shows the same text
+            # the stub and the module define the same names, and `help` shows the text of the stub
             assert inspect.cleandoc(getattr(getattr(stretch_gap, name), node.name).__doc__) == docstring
             is_property = any(isinstance(one, ast.Name) and one.id == "property" for one in node.decorator_list)
             is_none = isinstance(node.returns, ast.Constant) and node.returns.value is None
@@ -141,7 +141,7 @@ MODULE_NAMES = {name.rpartition(".")[2] for name in MODULES} | {"entries"}
 
 
 def called(tree: ast.AST) -> set[str]:
-    """Names of the functions that a function calls; `raise` if it raises an error. Names of methods begin with a dot."""
+    """Return the names of the functions that a function calls, and `raise` if it raises an error. Methods begin with a dot."""
     found = {"raise" for node in ast.walk(tree) if isinstance(node, ast.Raise)}
     for function in [node.func for node in ast.walk(tree) if isinstance(node, ast.Call)]:
         if isinstance(function, ast.Name):
@@ -153,7 +153,7 @@ def called(tree: ast.AST) -> set[str]:
 
 
 def reaching(target: str) -> set[str]:
-    """Names of the functions of the package that call `target`, also through others."""
+    """Return the names of the functions of the package that call `target`, directly or through other functions."""
     trees = [ast.parse(path.read_text(encoding="utf-8")) for path in PACKAGE.glob("*.py")]
     classes = [node for tree in trees for node in tree.body if isinstance(node, ast.ClassDef)]
     defined = [("", node) for tree in trees for node in tree.body] + [(".", node) for one in classes for node in one.body]
@@ -165,7 +165,7 @@ def reaching(target: str) -> set[str]:
 
 
 def sections(docstring: str) -> list[str]:
-    """Headings of the sections of a numpydoc docstring, each underlined along its length."""
+    """Return the headings of the sections of a numpydoc docstring. An underline is as long as its heading."""
     lines = inspect.cleandoc(docstring).splitlines()
     return [line for line, below in zip(lines, lines[1:]) if line and below == "-" * len(line)]
 
@@ -188,7 +188,7 @@ def test_every_section_of_a_public_function_is_there(name):
 
 
 def run_examples(tests):
-    """Run examples in the order of their names. Those of methods begin with the names that the example of their class defined."""
+    """Run examples in the order of their names. Examples of methods can use the names that the example of their class defines."""
     runner, names = doctest.DocTestRunner(), {}
     for test in tests:
         test.globs = {**test.globs, **names.get(test.name.rpartition(".")[0], {})}

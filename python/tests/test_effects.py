@@ -1,4 +1,4 @@
-"""The code of a fix computes what the diagnosis found: effects hidden by other code are named, and pasted code gives them."""
+"""Effects simulated by other code are named, and the code of the fix reproduces them."""
 
 import inspect
 
@@ -11,13 +11,13 @@ DT_S = 1.0 / RATE_HZ
 
 
 def late(x):
-    """A dead time of 55 ms."""
+    """Apply a dead time of 55 ms."""
     time_s = DT_S * np.arange(x.size)
     return np.interp(time_s - 0.055, time_s, x)
 
 
 def slow(x):
-    """A first-order lag of 80 ms."""
+    """Apply a first-order lag of 80 ms."""
     y, share = x.copy(), 1.0 - np.exp(-DT_S / 0.08)
     for i in range(1, x.size):
         y[i] = y[i - 1] + share * (0.5 * (x[i - 1] + x[i]) - y[i - 1])
@@ -25,7 +25,7 @@ def slow(x):
 
 
 def loose(x):
-    """A play of half-width 1.5."""
+    """Apply backlash with a half-width of 1.5."""
     y = x.copy()
     for i in range(1, x.size):
         y[i] = min(max(y[i - 1], x[i] - 1.5), x[i] + 1.5)
@@ -33,7 +33,7 @@ def loose(x):
 
 
 def limited(x):
-    """A slew rate of 70 per second."""
+    """Limit the slew rate to 70 per second."""
     y = x.copy()
     for i in range(1, x.size):
         y[i] = y[i - 1] + min(max(x[i] - y[i - 1], -70.0 * DT_S), 70.0 * DT_S)
@@ -49,7 +49,7 @@ HIDDEN = [
 
 
 def run(pasted, name, x):
-    """A column through pasted code, sample by sample, whatever the function takes."""
+    """Apply the function `name` of pasted code to a column, sample by sample, with the arguments that it takes."""
     step, start = pasted[name], pasted.get(f"{name}_start")
     wanted = list(inspect.signature(step).parameters)
     state = start(*[x[0]] * len(inspect.signature(start).parameters)) if start else None
@@ -66,7 +66,7 @@ def test_the_code_of_an_effect_is_the_effect(kind, hide, parameter, value):
     assert found.how_far["with_effects"]["length_mm"] < 1.2  # noise is 1
     assert found.effects[f"output.{kind}"][parameter] == pytest.approx(value, rel=0.1)
     pasted = {}
-    exec(found.fix().code, pasted)  # what a user would paste
+    exec(found.fix().code, pasted)  # a user would paste this code
     fixed = run(pasted, f"output_{kind}", pasted["parameters"]["compliance"] * FORCE)
     assert np.std(fixed - hidden) < 0.4 * np.std(noise(FORCE.size))
     np.testing.assert_allclose(found.fix()(), found.curves()["with_effects"], rtol=1e-9, atol=1e-9)

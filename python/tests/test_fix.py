@@ -1,4 +1,4 @@
-"""A fix is called in place of the user's simulator."""
+"""Tests that a fix can be called in place of the user's simulator."""
 
 import inspect
 
@@ -25,12 +25,12 @@ def slow(x, start, tau):
 
 
 def servo(params, effects, inputs, first):
-    """A toy servo: a lag of its command."""
+    """Simulate a servo: its angle follows the command with a first-order lag."""
     return slow(inputs["cmd_deg"], first["angle_deg"], params["tau"])
 
 
 def recording(command, seed):
-    """What a servo with a delay and play does."""
+    """Return a recording of a servo with a delay and backlash."""
     delayed = late(command)
     return {"cmd_deg": command, "angle_deg": loose(slow(delayed, delayed[0], 0.12)) + noise(command.size, seed)}
 
@@ -58,7 +58,7 @@ def test_a_call_computes_the_fixed_curves(found):
     slower = fix({"tau": 0.3}, inputs=one, first=begun(one))
     hidden = loose(slow(late(one["cmd_deg"]), one["cmd_deg"][0], 0.3))
     assert np.std(slower - hidden) < 0.02 < 0.3 < np.std(slower - called[: slower.size])
-    # a simulator of the user's own loop: few samples, and other columns than those that were recorded
+    # the user's own code calls the fix with few samples, and with other columns than the recorded ones
     assert fix(inputs={"cmd_deg": [0.0, 1.0]}, first={"angle_deg": 0.0}).shape == (2,)
 
 

@@ -1,4 +1,4 @@
-"""What Rust's work does to the interpreter around it."""
+"""Tests that other Python threads run, and Ctrl-C works, while Rust code computes."""
 
 import os
 import signal
@@ -31,14 +31,14 @@ def test_other_threads_run_on_while_rust_works():
     other.join()
     ticks = [begun] + [tick for tick in ticks if begun <= tick <= ended] + [ended]
     longest = max(later - earlier for earlier, later in zip(ticks, ticks[1:]))
-    # were the lock held, the longest silence would be the whole of the work
+    # if the work held the interpreter lock, the longest pause would be as long as the work
     assert longest < 0.5 * (ended - begun)
 
 
 def interrupted(code, tmp_path):
-    """Runs code that touches `ready` when it is about to work, interrupts it, and gives its exit code, time and text."""
+    """Run code, interrupt it after it has created `ready`, and return its exit code, time and error text."""
     script = tmp_path / "script.py"
-    # a job in the background of a shell is begun with the signal ignored
+    # a shell starts background jobs such that they ignore this signal
     heard = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
     script.write_text(heard + textwrap.dedent(code))
     ready = tmp_path / "ready"
@@ -68,7 +68,7 @@ def test_ctrl_c_ends_a_calibration(tmp_path):
     """
     status, seconds, text = interrupted(code, tmp_path)
     assert "KeyboardInterrupt" in text and status != 0
-    assert seconds < 20.0  # the whole takes minutes
+    assert seconds < 20.0  # without an interruption the code would run for minutes
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent the POSIX way")

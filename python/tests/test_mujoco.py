@@ -1,4 +1,4 @@
-"""A problem from a MuJoCo model, on two models that are made here; SKIPPED without the package mujoco."""
+"""Tests of problems made from two MuJoCo models. SKIPPED without the package mujoco."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ RATE_HZ = 100.0
 
 
 def commands(joints, seconds=22.0):
-    """Where each joint is asked to be, rad."""
+    """Return the commanded position of each joint, rad."""
     t = np.arange(0.0, seconds, 1.0 / RATE_HZ)
     return {
         name: 0.5 * np.sin((1.1 + 0.4 * i) * t) + 0.15 * np.sin((3.7 - 0.5 * i) * t + 1.0) + 0.05 * np.sin(9.0 * t)
@@ -54,7 +54,7 @@ def commands(joints, seconds=22.0):
 
 
 def measured(xml, change, asked, late=0):
-    """What a copy of the model does that was changed, with the encoder's noise."""
+    """Return the positions of a copy of the model that `change` has altered, with the noise of an encoder."""
     spec = mujoco.MjSpec.from_string(xml)
     change(spec)
     model = spec.compile()
@@ -125,7 +125,7 @@ def test_a_late_command_of_one_of_two_joints_becomes_its_actuators_delay():
     model, data = spec.compile(), None
     data = mujoco.MjData(model)
     data.ctrl[:] = 0.5
-    for _ in range(10):  # 20 ms: nothing has arrived yet
+    for _ in range(10):  # 20 ms is shorter than the delay
         mujoco.mj_step(model, data)
     before = abs(data.qpos[0])
     for _ in range(40):

@@ -1,4 +1,4 @@
-"""Nothing that is written replaces a recording or a simulator."""
+"""Tests that no output file replaces a recording or a simulator."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ WRITERS = {
     "Calibration.save": lambda record, folder, out: record.save(out),
     "Diagnosis.report": lambda record, folder, out: FOUND.report(out),
     "Diagnosis.to_rerun": lambda record, folder, out: timeline.write(out, {}, [], 0.01, "a sentence"),
-    # a shell makes of r*.npz the names of two recordings
+    # a shell expands r*.npz to the names of two recordings
     "convert": lambda record, folder, out: stretch_gap.convert(folder / "log.csv", out),
 }
 

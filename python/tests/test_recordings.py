@@ -1,4 +1,4 @@
-"""Recordings from files, which the libraries of their formats write here; each SKIPPED without its library."""
+"""Tests of reading files that the library of each format has written. Each is SKIPPED without its library."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def stamp_ns(time_s):
 
 
 def is_the_same_in_the_program(path, folder, **how):
-    """What `read` gives is what the program reads of the file that `convert` writes; the recording."""
+    """Return the recording of `read`. Assert that the program reads the same from the file that `convert` writes."""
     recording = stretch_gap.read(path, **how)
     out = folder / "converted.npz"
     stretch_gap.convert(path, out, force=True)
@@ -151,7 +151,7 @@ def test_messages_in_json_have_a_clock_a_topic(tmp_path):
     np.testing.assert_allclose(recording.clocks["gauge.time_s"]["time_s"], TIME_S, atol=1e-9)
     np.testing.assert_array_equal(recording.clocks["gauge.time_s"]["gauge.length_mm"], LENGTH_MM)
     np.testing.assert_array_equal(recording.clocks["pressure.time_s"]["pressure.time_s.value"], np.arange(12))
-    # the slower topic begins later and ends earlier: nothing is made up beyond it
+    # the slower topic begins later and ends earlier; the recording is not extrapolated beyond it
     assert (recording.time_s[0], recording.time_s.size) == (0.05, 45)
     np.testing.assert_allclose(recording["pressure_kpa"], 200 + 100 * recording.time_s, atol=0.0051)
     assert recording["pressure.valves.0"][0] == 1.0
@@ -166,7 +166,7 @@ def test_an_mcap_file_that_breaks_off_is_read_up_to_there(tmp_path):
     path = json_mcap(tmp_path / "run.mcap")
     needs("mcap_ros2"), needs("mcap_protobuf")
     whole = path.read_bytes()
-    # a file of chunks of one message each
+    # each chunk of the file holds one message
     writer_of = importlib.import_module("mcap.writer")
     with path.open("wb") as out:
         writer = writer_of.Writer(out, chunk_size=1)
@@ -252,13 +252,13 @@ def test_messages_of_protobuf(tmp_path):
     np.testing.assert_array_equal(recording["bridge_v"], BRIDGE_V)
     np.testing.assert_array_equal(recording["rig.gauge.count"], -np.arange(SAMPLES))
     np.testing.assert_array_equal(recording["rig.position.wrist"], -np.arange(SAMPLES))
-    # what protobuf leaves out is 0, and a message that is not there has no numbers
+    # protobuf does not store zeros, so a missing number is 0; a missing message has no columns
     np.testing.assert_array_equal(recording["rig.is_moving"][:2], [0.0, 1.0])
     assert not [name for name in recording if "absent" in name]
 
 
 def bag_of_ros2(folder, typesys, writer):
-    """A bag in SQLite as ROS 2 Humble writes it."""
+    """Write a bag in SQLite as ROS 2 Humble does."""
     store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
     kinds = store.types
     with writer as out:
@@ -312,7 +312,7 @@ def test_bags_of_ros1(tmp_path):
 
 
 def scope(labels, values, **more):
-    """What Simulink saves as "Structure With Time"."""
+    """Return a Simulink log of the kind "Structure With Time"."""
     signals = np.zeros(len(labels), dtype=[("values", "O"), ("dimensions", "O"), ("label", "O"), ("title", "O")])
     for i, (label, value) in enumerate(zip(labels, values)):
         signals[i] = (value, 1.0, label, label)
@@ -335,7 +335,7 @@ def test_what_simulink_logs_is_called_by_its_labels(tmp_path):
         np.testing.assert_array_equal(recording["ScopeData.gauge_v"], BRIDGE_V)
         assert any("blockName" in note for note in recording.notes)
     assert any("ScopeData.information.date, ScopeData.information.timestamp" in note for note in recording.notes)
-    # one signal is no array of structures; a matrix has a column a number; without a label it has the signal's number
+    # the columns of a matrix are numbered; a signal without a label is called by its number
     both = np.column_stack([LENGTH_MM, BRIDGE_V])
     for label, name in (("two", "simout.two"), ("", "simout.signal_1")):
         io.savemat(path, {"simout": scope([label], [both])})
@@ -395,7 +395,7 @@ def test_groups_of_hdf5_are_clocks_and_attributes_are_units(tmp_path):
 
 
 def seven_three(h5py, path, variables):
-    """MATLAB 7.3: HDF5 behind a header; structures are groups, arrays of structures and cells are references, text is numbers."""
+    """Write a MATLAB 7.3 file: HDF5 after a header. Arrays of structures and cells are references, texts are numbers."""
     with h5py.File(path, "w", userblock_size=512) as out:
         kept = out.create_group("#refs#")
 
@@ -421,7 +421,7 @@ def seven_three(h5py, path, variables):
                 refers = np.array([[refer(one)] for one in value], dtype=h5py.ref_dtype)
                 out.create_dataset(name, data=refers, dtype=h5py.ref_dtype).attrs["MATLAB_class"] = np.bytes_("cell")
             else:
-                out[name] = np.atleast_2d(value)  # a column of MATLAB is a row here
+                out[name] = np.atleast_2d(value)  # a column of MATLAB is a row in HDF5
                 out[name].attrs["MATLAB_class"] = np.bytes_("double")
 
         for name, value in variables.items():
@@ -448,7 +448,7 @@ def test_matlab_7_3_gives_what_version_5_gives(tmp_path):
     np.testing.assert_array_equal(recording["log.cells.0"], TIME_S + 1.0)
     np.testing.assert_array_equal(recording["ts.angle_deg"], TIME_S**2)
     assert any("object (an object of MATLAB's class timeseries" in note for note in recording.notes)
-    # one signal is a structure, and a matrix lies the other way
+    # a single signal is a structure instead of an array of structures, and its matrix is transposed
     seven_three(h5py, path, {"simout": {"time": TIME_S, "signals": {"values": np.array([LENGTH_MM, BRIDGE_V]), "label": "two"}}})
     recording = stretch_gap.read(path)
     np.testing.assert_array_equal(recording["simout.two.1"], BRIDGE_V)
@@ -515,7 +515,7 @@ def test_an_episode_of_lerobot_goes_by_the_names_of_its_description(tmp_path):
     ],
 )
 def test_a_missing_library_is_an_error_that_names_the_extra(head, module, extra, tmp_path, monkeypatch):
-    # what the import system answers where a module is not installed
+    # with None the import fails as if the module were not installed
     monkeypatch.setitem(sys.modules, module, None)
     (tmp_path / "run").write_bytes(head + bytes(600))
     with pytest.raises(stretch_gap.StretchError, match=rf'is not installed: pip install "stretch-gap\[{extra}\]"'):

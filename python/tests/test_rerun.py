@@ -1,4 +1,4 @@
-"""A diagnosis on Rerun's time line; SKIPPED without rerun-sdk."""
+"""Tests of writing a diagnosis as a Rerun recording. SKIPPED without rerun-sdk."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two of `examples/machines`, where their recordings are: STRETCH_DATA names the folder."""
+"""Tests of two systems of `examples/machines`. STRETCH_DATA names the folder of their recordings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import stretch_gap
 MACHINES = Path(os.environ.get("STRETCH_MACHINES", Path(__file__).parents[2] / "examples" / "machines"))
 DATA = Path(os.environ.get("STRETCH_DATA", Path(__file__).parents[3] / "shared" / "data"))
 COULOMB_N, OFFSET_N, MASS_KG = 20.39, -3.16, 95.11
-"""What was published of the axis."""
+"""Published values of the axis: Coulomb friction, offset and mass."""
 
 
 def machines() -> ModuleType:
@@ -38,7 +38,7 @@ def test_the_axis_lacks_the_coulomb_friction_that_was_published(every: int, tmp_
     diagnosis = diagnosed("positioning_axis", "emps", tmp_path, every=every)
     assert diagnosis.named == ["output.coulomb_friction"]
     found = diagnosis.effects["output.coulomb_friction"]
-    # the published offset is lopsided friction
+    # the published offset is equivalent to a friction that differs between the directions
     assert found["f"] == pytest.approx(COULOMB_N, rel=0.02)
     assert found["f"] * found["lopsided"] == pytest.approx(OFFSET_N, rel=0.05)
     assert diagnosis.parameters["mass"] == pytest.approx(MASS_KG, rel=0.02)

@@ -1,4 +1,4 @@
-"""The example of an environment with `step`."""
+"""Tests the example `step_function.py`, in which an environment with `step` is the simulator."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 #!/bin/sh
-# A cluster of four processes on this machine, a scheduler and three executors, that answers one question of a lake and ends:
+# Starts a scheduler and three executors on this machine, runs one query of a lake on this cluster, and stops it:
 #
 #   fleet/cluster.sh lake "select sensor, linear_fit(bridge_v, contraction) as fit from trials group by sensor"
 #
@@ -22,7 +22,7 @@ trap 'exit 130' INT TERM
 
 "$bin/stretch-scheduler" --port 0 >"$work/scheduler" 2>"$work/log" &
 pids="$!"
-# it says where it listens
+# the scheduler prints its address
 until url=$(grep -o 'df://[^ ]*' "$work/scheduler"); do
     kill -0 "$pids" 2>/dev/null || { cat "$work/log" >&2; exit 1; }
     sleep 0.1

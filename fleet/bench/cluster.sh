@@ -1,6 +1,6 @@
 #!/bin/sh
-# How time falls with executors of one task each: cluster.sh LAKE [BIN]
-# LAKE is a lake of stretch-fleet (stretch-fleet make); BIN holds the three programs.
+# Measures the time of a query for different numbers of executors, which run one task each: cluster.sh LAKE [BIN]
+# LAKE is a lake of stretch-fleet (made, for example, by stretch-fleet make). BIN is the folder of the three programs.
 set -eu
 lake=$1
 bin=${2:-"$(dirname "$0")/../../target/release"}

@@ -1,6 +1,6 @@
-"""What DuckDB and NumPy take on the files of `speed rows FOLDER ...`: python others.py FOLDER
+"""Measures the time of DuckDB and NumPy on the files that `speed rows FOLDER ...` wrote: python others.py FOLDER
 
-Needs duckdb, numpy and pyarrow (in a separate environment). Shortest of three, like the example.
+Requires duckdb, numpy and pyarrow (in a separate environment). The shortest of three times counts.
 """
 
 import glob
@@ -35,7 +35,7 @@ for threads in (1, 2):
     timed("DuckDB scan", threads, lambda: ask(f"select sum(rate), sum(bridge_v), sum(contraction) from {table}"))
     timed("DuckDB regr_slope by sensor", threads, lambda: ask(
         f"select sensor, regr_slope(contraction, bridge_v), regr_intercept(contraction, bridge_v) from {table} group by sensor"))
-    # poly13 as normal equations: the 28 products and 7 right-hand sides a branch that DuckDB would sum
+    # normal equations of poly13: DuckDB sums 28 products and 7 right-hand sides per branch
     terms = ["1.0", "rate", "bridge_v", "rate*bridge_v", "bridge_v*bridge_v", "rate*bridge_v*bridge_v",
              "bridge_v*bridge_v*bridge_v"]
     sums = [f"sum({a}*{b})" for k, a in enumerate(terms) for b in terms[k:]] + [f"sum({a}*contraction)" for a in terms]

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The functions in datafusion-python: what the workspace has built, in a fresh environment beside DataFusion's own package. It says
-# SKIPPED and why where there is no Python or no package. PYTHON names another interpreter, MODULE another build.
+# Tests the built module with datafusion-python in a fresh environment. Without Python or that package, prints SKIPPED and the
+# reason. PYTHON names another interpreter, MODULE another build of the module.
 set -euo pipefail
 cd "$(dirname "$0")"
 

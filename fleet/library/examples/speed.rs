@@ -94,8 +94,8 @@ fn session(threads: usize) -> SessionContext {
     session
 }
 
-/// Returns the CPU time of all threads of this process, s. On a shared machine it is the relevant
-/// time.
+/// Returns the CPU time of all threads of this process, s. On a shared machine, other processes
+/// affect the CPU time less than the elapsed time.
 fn computed_s() -> f64 {
     let stat = fs::read_to_string("/proc/self/stat").unwrap_or_default();
     let fields = stat.rsplit(") ").next().unwrap_or_default().split_whitespace();

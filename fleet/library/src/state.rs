@@ -79,7 +79,7 @@ enum Content<'a> {
         left_out: u64,
         /// JSON of the columns and of the estimator of the rates.
         about: &'a str,
-        /// One side of a line, two of a surface; nothing of a side without rows.
+        /// One side for a line, two for surfaces; `None` for a side without rows.
         sides: Vec<Option<Side>>,
     },
 }

@@ -54,8 +54,8 @@ impl Lock {
     }
 }
 
-/// Removes temporary files whose writers have ended. A writer locks its file as long as the file
-/// has its temporary name.
+/// Removes temporary files of processes that have ended. A running writer holds a lock on its
+/// temporary file.
 ///
 /// # Errors
 /// A folder that cannot be read, a file that cannot be removed.

@@ -133,8 +133,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     ))
 }
 
-/// Returns the random generator of a sensor and a day. Each starts at a different number, because
-/// neighbouring streams of one seed are copies of each other, shifted by a few draws.
+/// Returns the random generator of a sensor and a day. Each generator has its own start value,
+/// because neighbouring streams of one seed are copies of each other, shifted by a few draws.
 fn dice(seed: u64, of: [u32; 2]) -> RandomGenerator {
     let seed = of.iter().fold(seed, |seed, &part| RandomGenerator::new(seed, part.into()).bits());
     RandomGenerator::new(seed, 0)

@@ -13,7 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::lake::Refused;
 
-/// Number of refused files that are listed.
+/// Largest number of refused files that a message lists.
 const MOST_TOLD: usize = 20;
 
 /// Prints a line. A closed standard output is no error.

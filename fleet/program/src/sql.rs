@@ -78,8 +78,8 @@ impl On {
         self.cluster.is_none().then(|| stretch_gap::threads(self.threads.unwrap_or(0)))
     }
 
-    /// As `On::open`, for a command that writes partial fits into the lake. No other command
-    /// writes until the lock is released.
+    /// Like `On::open`, for a command that writes partial fits into the lake. No other command can
+    /// write until the returned lock is released.
     pub(crate) async fn open_to_write(&self) -> anyhow::Result<(Lock, Lake, SessionContext)> {
         ensure!(self.lake.is_dir(), "{}: this folder does not exist", self.lake.display());
         let lock = Lock::of(&self.lake, usize::MAX)?;

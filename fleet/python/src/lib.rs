@@ -1,4 +1,5 @@
-//! The functions of `stretch-fleet` in `datafusion-python`, passed as capsules of `datafusion-ffi`.
+//! Makes the functions of `stretch-fleet` available in `datafusion-python`, as capsules of
+//! `datafusion-ffi`.
 
 use std::{ffi::CStr, sync::Arc};
 
@@ -13,7 +14,7 @@ use pyo3::{
 const AGGREGATE: &CStr = c"datafusion_aggregate_udf";
 const SCALAR: &CStr = c"datafusion_scalar_udf";
 
-/// An aggregate, which `datafusion.udaf` takes.
+/// An aggregate function, which `datafusion.udaf` accepts.
 #[pyclass(frozen, module = "stretch_datafusion")]
 #[derive(Debug)]
 struct Aggregate(Arc<AggregateUDF>);
@@ -38,7 +39,7 @@ impl Aggregate {
     }
 }
 
-/// A function of a row, which `datafusion.udf` takes.
+/// A scalar function, which `datafusion.udf` accepts.
 #[pyclass(frozen, module = "stretch_datafusion")]
 #[derive(Debug)]
 struct Scalar(Arc<ScalarUDF>);
@@ -60,13 +61,13 @@ impl Scalar {
     }
 }
 
-/// All aggregates.
+/// Returns all aggregate functions.
 #[pyfunction]
 fn aggregates(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     PyList::new(py, stretch_fleet::aggregates().into_iter().map(Aggregate).collect::<Vec<_>>())
 }
 
-/// All functions of a row.
+/// Returns all scalar functions.
 #[pyfunction]
 fn scalars(py: Python<'_>) -> PyResult<Bound<'_, PyList>> {
     PyList::new(py, stretch_fleet::scalars().into_iter().map(Scalar).collect::<Vec<_>>())
@@ -85,7 +86,8 @@ fn register(context: &Bound<'_, PyAny>) -> PyResult<()> {
     Ok(())
 }
 
-/// Calibrations of stretch sensors as functions of SQL, for `datafusion` of the same line.
+/// Calibrations of stretch sensors as functions of SQL, for a `datafusion` package with the same
+/// major version.
 #[pymodule]
 fn stretch_datafusion(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

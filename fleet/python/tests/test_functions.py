@@ -1,4 +1,4 @@
-"""The functions answer in datafusion-python what NumPy answers."""
+"""Tests that the functions in datafusion-python give the same results as NumPy."""
 
 import json
 
@@ -15,7 +15,7 @@ RATE = {
 
 
 def rows(sensor, count=4000):
-    """Rate, signal and reference of a gauge, and noise."""
+    """Return rate, signal and reference of a simulated gauge with noise."""
     noise = np.random.default_rng(sensor)
     phase = 0.01 * np.arange(count) + sensor
     signal = 1.5 + 0.4 * np.sin(phase) + 1e-3 * noise.standard_normal(count)
@@ -25,7 +25,7 @@ def rows(sensor, count=4000):
 
 
 def by_numpy(rate, signal, reference):
-    """Coefficients of both branches as `poly13_fit` orders them: p00 p10 p01 p11 p02 p12 p03."""
+    """Return the coefficients of both branches in the order of `poly13_fit`: p00 p10 p01 p11 p02 p12 p03."""
     answer = []
     for side in (rate >= 0, rate < 0):
         r, v = rate[side], signal[side]
@@ -83,7 +83,7 @@ def test_states_merge_to_the_fit_of_all(session):
 
 
 def test_a_record_crosses_and_estimates(session):
-    """What the columns' fields say of rates comes through, so that there is a record; it estimates rows."""
+    """The metadata of the columns reaches the fit, so the result has a calibration. The calibration estimates rows."""
     record = session.sql(
         "select poly13_fit(rate, bridge_v, contraction)['record'] as record from trials where sensor = 1"
     ).to_pylist()[0]["record"]

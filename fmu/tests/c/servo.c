@@ -1,9 +1,9 @@
 /* A servo of first order with a brake as an FMU, FMI 2 or FMI 3 (-DFMI=2, -DFMI=3), co-simulation.
  *
- *     angle' = (gain u - brake - angle)/tau   by Euler's steps of the communication step
+ *     angle' = (gain u - brake - angle)/tau   by Euler's method with the communication step
  *
- * and `trouble`, which makes it misbehave one second into the run. What it needs of the standard is declared here; the rest of what a
- * library has to export is at the end, and answers error.
+ * The parameter `trouble` selects a fault that occurs one second after the start. This file declares the types of the standard that
+ * it needs. The functions at the end only return an error; the standard requires that a library exports them.
  */
 #include <math.h>
 #include <stdbool.h>

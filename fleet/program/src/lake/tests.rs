@@ -112,7 +112,7 @@ fn an_embedded_schema_of_unknown_types_is_an_unfit_file() {
             gave_up += lake.unfit.iter().filter(|file| failed(&file.why)).count();
         }
     }
-    // At least one change has caused such a panic.
+    // At least one change makes the reader panic.
     assert!(gave_up > 0);
 }
 

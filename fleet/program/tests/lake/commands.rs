@@ -7,7 +7,7 @@ use stretch_data::{Channel, Trial};
 
 use crate::support::{asked, bytes, file, fleet, parquet, refused, said, tree, trial};
 
-/// Sensors that drift are found, and no others. Four of ten sensors lose 5 % of their gain.
+/// Four of ten sensors lose 5 % of their gain. `drift` reports these four and no others.
 #[test]
 fn drift_names_the_sensors_that_moved() {
     let folder = tempfile::tempdir().unwrap();

@@ -470,7 +470,8 @@ fn report(
     notes.extend(not_fitted_note(&not_fitted));
     notes.extend(friction_note(simulator, &named));
     let identifiability = searched.problem.identified();
-    // A rig's parameters are known to act; a program of the user may ignore what it receives.
+    // All parameters of the built-in rig change an output. A program of the user may ignore a
+    // parameter.
     let is_program = simulator.model_runs().is_some();
     notes.extend(dead_parameters_note(&identifiability).filter(|_| is_program));
     notes.extend(spent);

@@ -9,7 +9,7 @@ pub(crate) fn told(measured: &Measured) -> Diagnosis {
     evidenced(measured, &Options::default()).0
 }
 
-/// As `told`, with the evidence.
+/// Like `told`, and also returns the evidence.
 pub(crate) fn evidenced(measured: &Measured, options: &Options) -> (Diagnosis, Evidence) {
     let (diagnosis, evidence) = measured.diagnosed_by(options);
     assert_consistent(&diagnosis, measured);

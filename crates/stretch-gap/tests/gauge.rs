@@ -31,7 +31,7 @@ pub(crate) enum Lack {
     Jumps,
     /// 0.04 V x (1 - x): the effect that the simulator knows.
     Curve,
-    /// Nothing.
+    /// No effect.
     Nothing,
     /// White noise of a third of the sensor noise.
     Whisper,
@@ -53,7 +53,7 @@ pub(crate) struct Gauge {
     volts: Vec<f64>,
 }
 
-/// Volts over the range of the rod.
+/// Change of the output over the range of the rod, V.
 const GAIN: f64 = 1.0;
 /// Rod at rest and its range, mm.
 const ZERO_MM: f64 = 40.0;

@@ -45,7 +45,7 @@ fn what_was_measured_cannot_tell_and_the_next_experiment_can() {
     );
 }
 
-/// Evidence per minute counts: the same motion after ten minutes of preparation is worth less, and
+/// Experiments are ranked by evidence per minute. The same motion after ten minutes of preparation
 /// ranks lower.
 #[test]
 fn preparation_counts_into_the_minutes() {

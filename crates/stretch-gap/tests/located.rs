@@ -96,8 +96,9 @@ fn a_gap_of_one_octave_stands_out_there() {
     assert_eq!(elsewhere(&told, &["frequency"]), []);
 }
 
-/// If nothing is wrong, a slice is significant in at most 5 % of the recordings (in fewer, because slices depend on
-/// each other). Of 60 recordings, the test allows the number that a binomial count exceeds once in a thousand.
+/// If there is no gap, a slice is significant in at most 5 % of the recordings. The number is smaller, because
+/// slices depend on each other. Of 60 recordings, the test allows the number that a binomial count exceeds once in
+/// a thousand.
 #[test]
 fn nothing_stands_out_of_noise() {
     let alarms = (0..60)
@@ -151,7 +152,7 @@ fn a_gap_has_the_stage_that_makes_it() {
     }
 }
 
-/// If nothing is wrong, the chain lacks only the noise that drives the line.
+/// If there is no gap, the chain lacks only the noise that drives the line.
 #[test]
 fn noise_that_drives_a_stage_is_that_of_the_stage_before() {
     let (gaps, ends) = end_to_end(0, 0.0);

@@ -1,4 +1,5 @@
-//! The tests of stretch-gap from outside, one program: linking takes longer than most of them.
+//! Integration tests of stretch-gap. They form one program, because linking takes longer than most
+//! tests.
 
 mod answers;
 mod consistent;

@@ -1,5 +1,5 @@
-//! The offset of a line is a function of the motion that is in no catalogue. This function is proposed; for noise,
-//! nothing is proposed.
+//! The offset of a line depends on the motion by a function that is in no catalogue. The diagnosis proposes this
+//! function. If the offset is noise, it proposes nothing.
 
 use crate::{
     consistent::told,

@@ -6,10 +6,10 @@ use stretch_gap::{Noise, NoteCode, RandomGenerator, VerdictKind, WINDOW, noise_v
 use crate::toys::{Effect, Law, Toy, noted, slow};
 
 const SAMPLES: usize = 20_000;
-/// Standard errors of a deviation estimated by the median of n squared second differences: the
-/// median of a squared normal variable is known to 0.5/(0.4711 sqrt n) of 0.4549, and neighbours
-/// that share samples make a third of them independent (1/(1 + 2 (4/6)^2 + 2 (1/6)^2)): 1.6/sqrt n
-/// of the deviation; five of them.
+/// Tolerance of an estimated standard deviation: five relative standard errors of 1.6/sqrt n. The
+/// estimate uses the median of n squared second differences. The median of a squared normal
+/// variable is known to 0.5/(0.4711 sqrt n) of 0.4549. Neighbouring differences share samples, so a
+/// third of them are independent: 1/(1 + 2 (4/6)^2 + 2 (1/6)^2).
 const TOLD: f64 = 5.0 * 1.6 / 141.0;
 
 fn white(sd: f64, seed: u64) -> Vec<f64> {
@@ -78,7 +78,7 @@ fn a_hum_of_the_mains_is_left_out() {
     }
 }
 
-/// A resonance that rings all the time counts as noise, because nothing in the recording shows that it is none. Second
+/// A permanent oscillation of a resonance counts as noise, because the recording does not show the difference. Second
 /// differences of A sin(2 pi f t) have the mean square A^2 (2 - 2 cos(2 pi f dt))^2/2. A sixth of it is reported as
 /// variance, and up to 1/0.4549 times that, because the estimate assumes the median of a squared normal variable,
 /// whereas the median of a squared sine equals its mean.
@@ -110,7 +110,8 @@ fn differences_tell_of_slow_noise_what_changes_from_sample_to_sample() {
         let record = slow(0.1, 0.01 * memory, (SAMPLES, 0.01), 5);
         let kept = (-1.0 / memory).exp();
         let expected = 0.1 * ((6.0 - 8.0 * kept + 2.0 * kept * kept) / 6.0).sqrt();
-        // Its differences are at most as correlated as those of white noise, so the tolerance is the same.
+        // The differences of this noise are at most as correlated as those of white noise, so the
+        // tolerance is the same.
         approx::assert_relative_eq!(deviation(&record, 0.01), expected, max_relative = TOLD);
     }
 }
@@ -129,7 +130,7 @@ fn windows_tell_slow_noise_that_differences_miss() {
     approx::assert_relative_eq!(found.sd(), 0.1, max_relative = 0.25);
     let (share, memory) = found.slow();
     assert!(share > 0.85 && (10.0..40.0).contains(&memory), "{share} {memory}");
-    // For moving signals only the quick part is reported, not the slow one.
+    // If the signals move, only the fast part of the noise is estimated, not the slow part.
     let quick = Noise::of_windows(&windows, Some(0.02), false, 0.01).expect("enough windows");
     assert!(quick.sd() < 0.05 && quick.slow().0 == 0.0, "{quick:?}");
     let samples = found.samples(50_000, &mut random);

@@ -89,7 +89,8 @@ fn a_simulation_that_fails_from_the_start_is_refused_and_one_that_is_gone_ends_a
         refusing.to_string(),
         "a value that it refuses (asked for line.gain = 1 u/v, line.zero = 0.2 u)"
     );
-    // A simulator that is gone ends the diagnosis at any time, and is not called again.
+    // If the simulator process has ended, the diagnosis ends at any time and does not call it
+    // again.
     let whole = failing(Fails::GoneAfter(usize::MAX)).measured(1);
     whole.diagnosed();
     for share in [0.0, 0.1, 0.3, 0.5, 0.7, 0.9] {

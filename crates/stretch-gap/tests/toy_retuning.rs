@@ -13,8 +13,8 @@ fn told(record: &Measured) -> Diagnosis {
 
 /// In white noise, the error of a parameter is its posterior standard deviation divided by sqrt(50), because a block
 /// counts as one observation. In addition, the prior pulls it towards its nominal value by sd^2/tolerance^2 of the
-/// distance. None of 80 parameters should be wrong by 4.5 standard deviations (probability 7e-6 each). Half a standard
-/// deviation is added for the midpoint rule, whose relative error of the rate is (2 pi rate h)^2/6 = 1.6e-4.
+/// distance. None of 80 parameters should have an error of 4.5 standard deviations (probability 7e-6 each). Half a
+/// standard deviation is added for the midpoint rule, whose relative error of the rate is (2 pi rate h)^2/6 = 1.6e-4.
 #[test]
 fn parameters_come_back_as_near_as_theory_says() {
     let mut random = RandomGenerator::new(1, 0);

@@ -60,7 +60,8 @@ proptest! {
             let is_long = not_tested[trial] as f64 * dt_s >= 30.0;
             let held = if is_long { (0.3 * not_tested[trial] as f64) as usize } else { 0 };
             prop_assert_eq!(of(Role::Held), held);
-            // A test trial is tested on as a whole; without one, the last quarter of every trial is.
+            // A test trial is completely used for testing. Without a test trial, the last quarter of
+            // every trial is.
             let quarter = (0.25 * range.len() as f64) as usize;
             let tested = match (trials[trial].1, roles.borrowed_test) {
                 (true, _) => range.len(),

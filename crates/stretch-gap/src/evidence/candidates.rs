@@ -46,7 +46,8 @@ pub struct Candidate {
     /// Excess that the set leaves: the larger of those on fitted and test trials.
     pub left: f64,
     /// Whether the strongest effect of the set is at an end of its range, which makes a cause
-    /// outside the catalogue more probable. [`EffectValue::at_bound`] tells of every effect.
+    /// outside the catalogue more probable. [`EffectValue::at_bound`] gives this for the parameters
+    /// of every effect.
     pub at_bound: bool,
     /// Closed-gap fraction.
     pub closed: f64,
@@ -70,8 +71,8 @@ impl Candidate {
         1.0 + self.left > 1.2 * 1.2 * (1.0 + self.gap_after)
     }
 
-    /// Root mean square that the set leaves, in multiples of the noise: on test trials, or on the
-    /// fitted trials if the set [fits these worse](Self::fits_worse).
+    /// Root mean square of the residual that the set leaves, in multiples of the noise: on test
+    /// trials, or on the fitted trials if the set [fits these worse](Self::fits_worse).
     ///
     /// ```
     /// use stretch_gap::Candidate;

@@ -53,7 +53,7 @@ use crate::{
 /// Quantile of the standard normal distribution that nine of ten draws do not exceed.
 const NINE_OF_TEN: f64 = 1.2816;
 /// A limit is searched between the shares [`LEAST`] and [`INSIDE`] of the range, because an effect
-/// at the end of its range is taken for a compensation of something else.
+/// at the end of its range is not named: it probably compensates for another cause.
 const LEAST: f64 = 1e-6;
 const INSIDE: f64 = 0.99;
 /// Number of bisection steps of the logarithm of the amplitude. They determine a limit with an
@@ -78,7 +78,7 @@ const POWERS: [f64; 2] = [0.5, 60.0];
 pub struct DetectionLimit {
     /// Effect.
     pub effect: String,
-    /// Parameter that is its strength.
+    /// Parameter that is the strength of the effect.
     pub parameter: String,
     /// Value of the parameter at which the effect would be named with probability 0.9 if the
     /// re-tuned nominal simulator were otherwise true. A fit of an effect begins at several sets of
@@ -90,8 +90,8 @@ pub struct DetectionLimit {
     pub unit: String,
     /// Values of the other parameters.
     pub others: BTreeMap<String, f64>,
-    /// Value of the parameter at which something would be seen with probability 0.9, although
-    /// another effect may be named in its place.
+    /// Value of the parameter at which a missing effect would be detected with probability 0.9,
+    /// although another effect may be named in its place.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seen: Option<f64>,
     /// The effect that changes the output most similarly. Given only if it makes the limit larger
@@ -100,8 +100,8 @@ pub struct DetectionLimit {
     pub like: Option<String>,
 }
 
-/// Inputs of the computation of detection limits. The residual of the best set is taken for noise,
-/// and the thresholds define the rule by which effects are named.
+/// Inputs of the computation of detection limits. The residual of the best set is treated as noise.
+/// The thresholds define the rule by which effects are named.
 #[derive(Clone, Copy)]
 pub(crate) struct LimitInputs<'a> {
     pub(crate) problem: &'a PreparedProblem<'a>,
@@ -258,8 +258,8 @@ fn moved_starts(
         if moved != off && !is_costly {
             values[main] = moved;
         }
-        // An effect of an unusual form may act although its strength is off, so starts with an
-        // unusual form come last.
+        // An effect with an unusual form may change the output even if its strength is off.
+        // Therefore starts with an unusual form come last.
         let mut forms = spec.parameters.iter().zip(&values);
         let is_odd = forms.any(|(p, v)| p.usual_form().is_some_and(|usual| usual != *v));
         let share = limit.abs() / (parameter.max - parameter.min);

@@ -1,10 +1,10 @@
 //! Simulates every trial with the parameters as shipped, re-tuned, and with the best set of
 //! effects. This includes the test trials, which no earlier step has read.
 //!
-//! Noise is what no model could remove. If the best set leaves a reduced chi-square X < 1 over the
-//! fitted and held-out samples, the noise was overestimated. The variance of the noise is then
-//! taken as X times the estimate, and every excess (reduced chi-square minus one) is relative to
-//! this variance.
+//! A residual contains at least the noise, which no model can predict. If the best set leaves a
+//! reduced chi-square X < 1 over the fitted and held-out samples, the noise was overestimated. The
+//! variance of the noise is then taken as X times the estimate, and every excess (reduced
+//! chi-square minus one) is relative to this variance.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -54,11 +54,11 @@ pub struct StageEvidence {
 /// of fitted and test trials.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 pub struct Excess {
-    /// Parameters as shipped, test trials only.
+    /// Excess with the parameters as shipped, on the test trials only.
     pub raw: f64,
-    /// Parameters re-tuned.
+    /// Excess with re-tuned parameters.
     pub retuned: f64,
-    /// With the best set of effects, whether it is named or not.
+    /// Excess with the best set of effects, whether it is named or not.
     pub left: f64,
 }
 
@@ -117,7 +117,7 @@ struct Traces {
 }
 
 impl Traces {
-    /// `level` is the variance of the noise relative to its estimate.
+    /// `level` is the variance of the noise divided by its estimate.
     fn of(
         problem: &PreparedProblem<'_>,
         stage: usize,

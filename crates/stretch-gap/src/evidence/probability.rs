@@ -32,7 +32,7 @@
 //! alone stays in 19 of 20 recordings. For any other cause, every size of the gap is assumed to be
 //! equally probable. Sets that explain less than 30 % of the gap are discarded. Every gap is the
 //! larger of the gaps on fitted and on test trials. If the strongest effect of a set is at an end
-//! of its range, the odds o_h are ten times as large, because it may compensate for something else.
+//! of its range, the odds o_h are ten times as large, because it may compensate for another cause.
 
 use crate::{
     fit::hypothesis::Hypothesis,
@@ -207,7 +207,7 @@ pub(crate) fn allowed(retuned: f64, left: f64, thresholds: &Thresholds) -> f64 {
     thresholds.unknown_excess + thresholds.unknown_share * closed
 }
 
-/// Factor on the odds of something else if the strongest effect of a set is at an end of its range.
+/// Factor on the odds of another cause if the strongest effect of a set is at an end of its range.
 const AT_BOUND: f64 = 10.0;
 
 /// Returns the odds that a cause other than noise and model discrepancy leaves as much: o_h in the
@@ -358,8 +358,8 @@ mod tests {
         }
     }
 
-    /// If nothing is found and hundreds of times the noise's variance are left, "nothing" is no
-    /// explanation.
+    /// If no effect is found and the gap is hundreds of times the noise's variance, the hypothesis
+    /// that nothing is missing is improbable.
     #[test]
     fn nothing_does_not_explain_a_large_gap() {
         let of = |retuned: f64| {
@@ -406,7 +406,7 @@ mod tests {
         let far = posterior(&[(0.0, 0.0), (-1e4, 0.0), (-1e5, 0.0)]);
         assert!(far.sets.iter().all(|w| w.probability.is_finite()));
         assert_eq!(far.sets[1].probability, 0.0);
-        // If there is no gap at all, the share is relative to the smallest gap that counts.
+        // If there is no gap, shares are relative to the smallest gap that counts.
         let none = weigh(&Thresholds::frozen(), of_size(0.0), vec![fitted(&[0], 0.0, 0.0)], None);
         assert!(none.sets.iter().all(|w| w.probability.is_finite()) && none.unknown.is_finite());
     }

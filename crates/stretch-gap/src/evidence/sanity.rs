@@ -51,8 +51,8 @@ pub(crate) struct Sanity {
     pub(crate) left: Vec<f64>,
     /// Largest share that may be left. If more is left, the names of effects mean nothing.
     pub(crate) allowed: f64,
-    /// Of the stages with parameters at their bounds, the one with the largest remaining excess, if
-    /// any.
+    /// The stage with the largest remaining excess of those with parameters at their bounds, if
+    /// there is one.
     pub(crate) at_bounds: Option<AtBounds>,
     /// Stages whose noise level is implausible, each with the ratio of its residual to the noise.
     pub(crate) implausible: Vec<(usize, f64)>,

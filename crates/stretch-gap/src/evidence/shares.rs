@@ -5,10 +5,10 @@
 //! effects are removed one after the other, from the weakest to the strongest, and the remaining
 //! ones are fitted again each time. The share of an effect is (gap without it - gap with it)/gap of
 //! the nominal simulator. These shares add up to the share that the whole set closes. They are
-//! computed on the test trials, because on fitted trials any effect closes something. The excess
-//! that an effect closes (its size) is, like every gap, the larger of the values on fitted and on
-//! test trials. The reason is that an effect that acts only in long trials (creep over half a
-//! minute) closes little in short ones.
+//! computed on the test trials, because on fitted trials any effect reduces the residual. The
+//! excess that an effect closes (its size) is, like every gap, the larger of the values on fitted
+//! and on test trials. The reason is that an effect that acts only in long trials (creep over half
+//! a minute) closes little in short ones.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

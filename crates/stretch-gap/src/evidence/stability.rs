@@ -65,7 +65,7 @@ impl Drawn {
     }
 }
 
-/// What a set leaves in a drawn recording: its misfits, and the gap on the test trials.
+/// Misfits of a set in a drawn recording, and its gap on the test trials.
 struct Left {
     misfits: Vec<Misfit>,
     tested: f64,

@@ -29,7 +29,7 @@ pub(crate) struct Hypothesis {
 
 impl Hypothesis {
     /// Whether a parameter of an effect is at an end of its range. The effect may then compensate
-    /// for something else.
+    /// for another cause.
     pub(crate) fn is_at_bound(&self, effect: usize, catalogue: &[EffectSpec]) -> bool {
         self.model.effect(effect).is_some_and(|values| catalogue[effect].is_at_bound(values))
     }

@@ -40,11 +40,12 @@ const AT_BOUND: f64 = 0.995;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Knowledge {
-    /// To a third of its tolerance or better.
+    /// The standard deviation of the parameter is at most a third of its tolerance.
     Determined,
-    /// Better than its tolerance, but not much.
+    /// The standard deviation of the parameter is at most 0.9 of its tolerance.
     Weakly,
-    /// Not better than its tolerance.
+    /// The standard deviation of the parameter is larger: the data add almost nothing to its
+    /// tolerance.
     Not,
     /// The parameter does not change any measured output.
     Dead,
@@ -65,7 +66,8 @@ pub struct Identified {
     pub sd: f64,
     /// Standard deviation that the parameter would have if all others were known.
     pub sd_alone: f64,
-    /// Parameters that do the same as far as these data show; only their combination is known.
+    /// Parameters that change the outputs in the same proportion as this one; the data determine
+    /// only a combination of them.
     pub like: Vec<String>,
     /// Whether the re-tuned value is at the end of its tolerances or of its range.
     pub at_bound: bool,

@@ -233,7 +233,7 @@ struct Descent<'a, 'b> {
     normal: DMatrix<f64>,
     gradient: Vec<f64>,
     lambda: f64,
-    /// As the field of [`Fitted`] with the same name.
+    /// See the field of [`Fitted`] with the same name.
     is_settled: bool,
 }
 

@@ -9,8 +9,8 @@
 //! T(e) = sum over c of ( sum over b of e_b S_bc )^2 / n_c,     e_b = +1 or -1
 //! ```
 //!
-//! has the same distribution for all signs e if in each part the residual is as likely as its
-//! negative, whatever its autocorrelation within the part is. Therefore T with all signs positive
+//! has the same distribution for all signs e if a residual and its negative are equally likely in
+//! each part. This holds for any autocorrelation within a part. Therefore T with all signs positive
 //! is compared with T for random signs (randomisation test; Davison and Hinkley 1997, section 4.3).
 //! The mean of each part is subtracted first, because a drift slower than a part would correlate
 //! neighbouring parts.

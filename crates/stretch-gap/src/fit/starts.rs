@@ -60,7 +60,7 @@ pub struct Starts {
     /// Number of points within the tolerances from which parameters were re-tuned. It is 1 if re-tuning from the
     /// parameters as shipped was not repeated.
     pub tried: usize,
-    /// How many of them ended at the best result.
+    /// Number of these starts that ended at the best result.
     pub agreed: usize,
 }
 

@@ -10,13 +10,13 @@
 //! | --- | --- | --- |
 //! | jitters | noise that follows the rate, if this is the most likely cause: [`jitter`](super::jitter) | standard deviation of the time error |
 //! | swings | sines of one frequency f, of any phase in each stretch: sum over stretches (2/n) \|sum r exp(-i 2 pi f t)\|^2 | f, and the amplitude |
-//! | jumps | at least eight changes of more than six noises, each twice as large as the changes before and after: sum of their d_i^2 | how many a second, and their root mean square |
+//! | jumps | at least eight changes of more than six times the noise, each twice as large as the changes before and after: sum of their d_i^2 | number per second, and root mean square |
 //! | drifts | reported if no other course explains enough | root mean square, and the time after which the autocorrelation has fallen to 1/e |
 //!
-//! A signal that moves with the simulated output is not reported as jumping: what is late by a
-//! constant time changes whenever the output steps. The changes of the output s_i, at the two lags
-//! that explain most, must explain less than a quarter of what the jumps explain:
-//! (sum d_i s_(i-k))^2 / sum s_i^2 for a lag of k samples.
+//! A signal that moves with the simulated output is not reported as jumping: a signal that is late
+//! by a constant time changes whenever the output steps. The changes of the output s_i, at the two
+//! lags that explain most, must explain less than a quarter of what the jumps explain: (sum d_i
+//! s_(i-k))^2 / sum s_i^2 for a lag of k samples.
 
 use std::f64::consts::TAU;
 
@@ -45,30 +45,30 @@ const TURNS: f64 = 3.0;
 /// Largest frequency, in periods per sample.
 const QUICKEST: f64 = 0.4;
 
-/// The course of a residual that no recorded signal explains, in the unit of its channel.
+/// The course in time of a residual that no recorded signal explains, in the unit of its channel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Course {
-    /// Its time stamps jitter: the noise follows the rate of the channel.
+    /// The time stamps jitter: the noise follows the rate of the channel.
     Jitters {
         /// Standard deviation of the time between a sample and its stamp, s.
         sd_s: f64,
     },
-    /// It swings.
+    /// The residual oscillates at one frequency.
     Swings {
         /// Frequency, Hz.
         hertz: f64,
         /// Amplitude.
         amplitude: f64,
     },
-    /// It jumps.
+    /// The residual jumps.
     Jumps {
-        /// Jumps a second.
+        /// Number of jumps per second.
         per_s: f64,
         /// Root mean square of a jump.
         size: f64,
     },
-    /// It drifts.
+    /// The residual drifts.
     Drifts {
         /// Root mean square.
         size: f64,

@@ -1,5 +1,5 @@
-//! The library: all terms that are considered as missing in a stage. It was written from physics,
-//! before any of the cases with which it is evaluated.
+//! The library: all terms that a stage may lack. It was chosen from physics, before the cases
+//! existed on which it is evaluated.
 //!
 //! | kind | terms of a signal x with rate v | describes |
 //! | --- | --- | --- |

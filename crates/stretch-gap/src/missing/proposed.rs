@@ -24,7 +24,8 @@ pub struct SignalScale {
     pub scale: f64,
     /// dx/dt at v = 1, 1/s.
     pub rate_per_s: f64,
-    /// Whether it is a command. Terms that leak do so in proportion to the sum of commands.
+    /// Whether the signal is a command. A leak of a term is proportional to the sum of the
+    /// commands.
     pub is_command: bool,
 }
 
@@ -35,7 +36,7 @@ pub struct ProposedTerm {
     pub name: String,
     /// Coefficient.
     pub coefficient: f64,
-    /// One standard deviation of it.
+    /// One standard deviation of the coefficient.
     pub sd: f64,
     /// Unit of the coefficient: that of the channel.
     pub unit: String,
@@ -43,7 +44,7 @@ pub struct ProposedTerm {
     pub form: Term,
 }
 
-/// A sum of terms that the simulator and the catalogue lack, or the statement that none was found.
+/// A sum of terms that the simulator and the catalogue lack, or a report that none was found.
 ///
 /// The sum can be computed from these fields alone: `channel += sum coefficient form`, with
 /// memories at rest at the start of every trial.
@@ -69,17 +70,18 @@ pub struct Proposed {
     pub closes_test: f64,
     /// Where the sum acts.
     pub acts: String,
-    /// Whether the residual is random in time: no function of what was recorded predicts it.
+    /// Whether the residual is random in time: no function of the recorded signals predicts it.
     pub random: bool,
-    /// Its course in time, if it is random in time.
+    /// Course of the residual in time, if the residual is random in time.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub course: Option<Course>,
-    /// ln of the odds that it is a function of what was recorded rather than random in time.
+    /// Natural logarithm of the odds that the residual is a function of the recorded signals, and
+    /// not random in time.
     pub log_odds: f64,
     /// Share of the remaining gap that many terms of the library predict together on held-out
     /// samples.
     pub predicted: f64,
-    /// All of this in one sentence.
+    /// The proposal in one sentence.
     pub sentence: String,
 }
 

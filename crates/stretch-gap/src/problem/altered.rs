@@ -44,8 +44,8 @@ pub(crate) struct Altered<'a> {
 }
 
 impl<'a> Altered<'a> {
-    /// Replaces the specification of every parameter by what `altered` returns for its index and
-    /// specification.
+    /// Replaces the specification of every parameter. `altered` returns the new one, given the
+    /// index and the old one.
     pub(crate) fn of(
         simulator: &'a dyn Simulator,
         altered: impl Fn(usize, &ParameterSpec) -> ParameterSpec,

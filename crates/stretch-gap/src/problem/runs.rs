@@ -51,7 +51,7 @@ pub(crate) struct Runs<'a> {
     most: Arc<[f64]>,
     /// Factor on the integration steps.
     step: f64,
-    /// As the field of [`Run`].
+    /// See the field of [`Run`] with the same name.
     may_use_reserve: bool,
 }
 

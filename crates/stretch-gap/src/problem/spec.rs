@@ -190,7 +190,7 @@ impl EffectSpec {
     }
 
     /// Whether a size of the effect is at an end of its range, other than the value that switches
-    /// the effect off. The effect then compensates for something else.
+    /// the effect off. The effect then compensates for another cause.
     pub(crate) fn is_at_bound(&self, values: &[f64]) -> bool {
         self.parameters.iter().zip(values).any(|(p, value)| self.ends(p, *value))
     }
@@ -202,8 +202,8 @@ impl EffectSpec {
             true => (value / end).ln().abs() < AT_END * (p.max / p.min).ln(),
             false => (value - end).abs() < AT_END * (p.max - p.min),
         };
-        // Only sizes are checked. If a time constant wants to leave its range, the effect is still
-        // the right cause. If a size does, the cause is another.
+        // Only sizes are checked. If the best time constant is outside its range, the effect is
+        // still the right cause. If the best size is, there is another cause.
         let is_size = p.is_fitted() && !self.is_found;
         is_size && p.off().is_some_and(|off| !near(off)) && (near(p.min) || near(p.max))
     }

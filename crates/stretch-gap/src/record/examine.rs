@@ -42,7 +42,7 @@ const LEAST: f64 = 0.03;
 const LEAST_SAMPLES: f64 = 2.0;
 /// Number of standard deviations by which the size of an error must exceed what is allowed.
 const SURE: f64 = 3.0;
-/// Marks an alternative that replaces the whole set and not one of its effects.
+/// Index that marks an alternative to the whole set, not to one of its effects.
 const WHOLE: usize = usize::MAX;
 /// The share of the gap that an error may leave, divided by that of a set of effects, whose forms
 /// differ from those of the rig.

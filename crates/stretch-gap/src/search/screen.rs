@@ -130,8 +130,8 @@ impl Comparison<'_> {
             let alpha = alpha.clamp(least, most);
             let promise = |a: f64| self.weight() * (a * with_residual - 0.5 * a * a * own);
             let gain = promise(alpha);
-            // The change may be non-linear, so the unscaled start is kept as well, with the gain
-            // that its simulation shows.
+            // The change may be non-linear. Therefore the unscaled start is kept as well, with the
+            // gain computed from its simulation.
             if scalable && promise(1.0) > 0.0 {
                 starts.push((values.clone(), promise(1.0)));
             }

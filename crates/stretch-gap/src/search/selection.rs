@@ -1,11 +1,11 @@
 //! Searches the best set of effects by forward selection, backward elimination, and alternatives
 //! for every effect.
 //!
-//! Greedy forward selection may keep a strong effect that stands for several smaller ones. The
-//! search therefore revises its choice in three ways. Weak effects are removed, with the rest
-//! fitted again from the larger set. Every effect of the best set is compared with alternatives
-//! fitted in its place. An alternative with a better score replaces the effect, and the search
-//! continues from there.
+//! Greedy forward selection may keep a strong effect in place of several smaller ones that are the
+//! true cause. The search therefore revises its choice in three ways. Weak effects are removed,
+//! with the rest fitted again from the larger set. Every effect of the best set is compared with
+//! alternatives fitted in its place. An alternative with a better score replaces the effect, and
+//! the search continues from there.
 
 use std::{collections::BTreeMap, sync::Arc};
 

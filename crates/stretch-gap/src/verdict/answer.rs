@@ -16,8 +16,8 @@ use crate::{
 
 /// The answer of a diagnosis.
 ///
-/// What a simulator leaves is the root mean square of its residual, in multiples of the noise.
-/// Shares refer to the gap on trials that were not fitted.
+/// Root mean squares of residuals are in multiples of the noise. Shares refer to the gap on trials
+/// that were not fitted.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Answer {
@@ -28,9 +28,9 @@ pub enum Answer {
     },
     /// Simulator and rig agree after parameters are re-tuned within their tolerances.
     Retuned {
-        /// What the simulator leaves with its parameters as shipped.
+        /// Root mean square of the residual with the parameters as shipped.
         shipped: f64,
-        /// What it leaves with re-tuned parameters.
+        /// Root mean square of the residual with re-tuned parameters.
         left: f64,
         /// Effects that were found but are too small to matter.
         small: Vec<String>,
@@ -38,11 +38,12 @@ pub enum Answer {
     /// The simulator leaves more than the stated noise would in 19 of 20 recordings, but too little
     /// to name a cause.
     Faint {
-        /// Root mean square of the residual of the re-tuned simulator, in multiples of the noise.
+        /// Root mean square of the residual of the re-tuned simulator.
         left: f64,
-        /// The same for noise alone: it is below this value in 19 of 20 recordings.
+        /// Value that this root mean square does not exceed in 19 of 20 recordings with noise
+        /// alone.
         noise: f64,
-        /// Stage that contains most of it.
+        /// Stage with the largest gap.
         stage: String,
         /// Whether re-tuning the parameters reduced a relevant gap.
         is_retuned: bool,
@@ -53,9 +54,10 @@ pub enum Answer {
     Missing {
         /// The effects, the strongest first.
         effects: Vec<MissingEffect>,
-        /// What they close together.
+        /// Part of the gap that the effects close together.
         closes: Closed,
-        /// What they do not explain, if more is left than noise and model discrepancy.
+        /// Part of the gap that the effects leave, if it is more than noise and model discrepancy
+        /// leave.
         #[serde(skip_serializing_if = "Option::is_none")]
         rest: Option<Unexplained>,
         /// Effects that were found but close less than a named effect must.
@@ -69,39 +71,41 @@ pub enum Answer {
         /// The errors: the most probable one and those that the data cannot distinguish from it, or
         /// all errors that the columns alone show.
         errors: Vec<Gross>,
-        /// What closes if the first error is corrected; none if the columns alone show the error.
+        /// Part of the gap that closes if the first error is corrected; none if the columns alone
+        /// show the error.
         #[serde(skip_serializing_if = "Option::is_none")]
         corrected: Option<Closed>,
     },
     /// There is a gap that the catalogue does not explain.
     Unknown {
-        /// Stage that contains most of it.
+        /// Stage with the largest gap.
         stage: String,
-        /// What the re-tuned simulator leaves.
+        /// Root mean square of the residual of the re-tuned simulator.
         left: f64,
-        /// The effect that closes most, and what is left with it.
+        /// The effect that closes most of the gap, and the root mean square of the residual with
+        /// the best set of effects.
         #[serde(skip_serializing_if = "Option::is_none")]
         best: Option<(String, f64)>,
         /// Effects that each close a part of the gap.
         parts: Vec<EffectShare>,
-        /// What all effects close together.
+        /// Share of the gap that all effects of the best set close together.
         together: f64,
     },
-    /// Parameters are at the ends of their tolerances, and without tolerances would explain as much
-    /// as the effects do.
+    /// Parameters are at the ends of their tolerances. With wider tolerances, and without effects,
+    /// they would explain as much as the effects do.
     AtBounds {
         /// Stage of the parameters.
         stage: String,
-        /// The parameters.
+        /// Names of the parameters.
         parameters: Vec<String>,
-        /// What is left in spite of that.
+        /// Root mean square of the residual with these parameters and the best set of effects.
         left: f64,
-        /// The answer without this finding.
+        /// The answer that the probabilities alone would give.
         otherwise: Box<Answer>,
     },
     /// The recording is not sufficient to name an effect.
     TooLittle {
-        /// The reason.
+        /// The reason why it is not sufficient.
         why: TooLittle,
     },
 }
@@ -109,27 +113,28 @@ pub enum Answer {
 /// A missing effect.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MissingEffect {
-    /// Its name.
+    /// Name of the effect.
     pub name: String,
     /// Effects that may be missing instead.
     pub alternatives: Vec<String>,
-    /// The effect and those alternatives that do the same, described by what they do.
+    /// The effect and the alternatives that change the output in the same way, described by this
+    /// change.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub family: Option<EffectFamily>,
-    /// Share of the gap that it closes.
+    /// Share of the gap that the effect closes.
     pub closes: f64,
-    /// Whether one of its parameters is at an end of its range.
+    /// Whether a parameter of the effect is at an end of its range.
     pub at_bound: bool,
 }
 
-/// What a hypothesis closes of the gap on trials that were not fitted.
+/// The part of the gap that a hypothesis closes, on trials that were not fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Closed {
     /// Share of the gap.
     pub share: f64,
     /// 95 % interval of the share.
     pub interval: [f64; 2],
-    /// What is left.
+    /// Root mean square of the residual that is left, in multiples of the noise.
     pub left: f64,
     /// Whether much more is left on the fitted trials than on the test trials.
     pub fits_worse: bool,
@@ -139,7 +144,7 @@ pub struct Closed {
 }
 
 impl Closed {
-    /// Describes a candidate among candidates with the same effects up to a tie.
+    /// Describes a candidate. `probability` is that of the candidate or one of its ties.
     pub(crate) fn of(candidate: &Candidate, probability: f64) -> Self {
         Self {
             share: candidate.closed,

@@ -45,9 +45,9 @@ pub enum VerdictKind {
 /// The part of the gap that the named effects leave.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Unexplained {
-    /// Share of the gap on trials that were not fitted.
+    /// Share of the gap that the named effects leave on trials that were not fitted.
     pub share: f64,
-    /// Stage that contains most of it.
+    /// Stage with the largest gap.
     pub stage: String,
     /// Slices of that stage with the largest gap, the largest first.
     pub sits: Vec<String>,
@@ -56,22 +56,22 @@ pub struct Unexplained {
 /// The error that the gap causes in a calibration, for two models.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Transfer {
-    /// With a straight line as the model.
+    /// Errors of a calibration with a straight line as the model.
     pub linear: TransferError,
-    /// With the surface `poly13` as the model.
+    /// Errors of a calibration with the surface `poly13` as the model.
     pub poly13: TransferError,
     /// Unit of the errors: `percent_full_scale`.
     pub unit: String,
 }
 
-/// Errors of a calibration that was trained on different data and applied to measured trials.
+/// Errors of calibrations that were trained on different data and applied to measured trials.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct TransferError {
-    /// Trained on measured trials.
+    /// Error of a calibration trained on measured trials.
     pub real: f64,
-    /// Trained in the re-tuned nominal simulator.
+    /// Error of a calibration trained in the re-tuned nominal simulator.
     pub sim: f64,
-    /// Trained in the simulator with the named effects.
+    /// Error of a calibration trained in the simulator with the named effects.
     pub sim_with_effect: f64,
 }
 
@@ -129,19 +129,20 @@ pub struct Diagnosis {
     /// Sets of effects, the most probable first. Then follow the hypothesis that nothing is missing
     /// (no effects) and a cause outside the catalogue (`unknown`).
     pub candidates: Vec<Candidate>,
-    /// What each effect of the best set closes of the gap on trials that were not fitted, the
+    /// Share of the gap on trials that were not fitted that each effect of the best set closes, the
     /// strongest first, whether named or not.
     pub shares: Vec<EffectShare>,
-    /// How certainly each effect of the compared sets belongs to the most probable set, the most
-    /// certain first.
+    /// Stability of each effect of the compared sets: the share of resampled recordings in which
+    /// the most probable set holds the effect. The most stable effect comes first.
     pub stabilities: Vec<EffectStability>,
     /// Size of the gap.
     pub gap: Excess,
-    /// Gap that 19 of 20 such recordings stay below if nothing is missing.
+    /// Gap that 19 of 20 similar recordings do not exceed if nothing is missing.
     pub null_band: f64,
-    /// Strength from which each effect of the catalogue would be named, in the catalogue's order.
-    /// Empty if an effect is named, unless they were [requested](crate::Options::detection_limits),
-    /// and empty if the recording is not sufficient to name an effect.
+    /// Smallest strength at which each effect of the catalogue would be named, in the catalogue's
+    /// order. Empty if an effect is named, unless they were
+    /// [requested](crate::Options::detection_limits), and empty if the recording is not sufficient
+    /// to name an effect.
     pub detection_limits: Vec<DetectionLimit>,
     /// Where the gap occurs.
     #[serde(rename = "where")]
@@ -183,7 +184,7 @@ struct Written {
     tied: Vec<String>,
     /// Effects that were found but close less than `least_gap`.
     faint: Vec<String>,
-    /// What a partial answer does not explain.
+    /// Part of the gap that a partial answer does not explain.
     unexplained: Option<Unexplained>,
     /// Errors of the recording or of the rig file: all that the columns alone show, or one error
     /// with those that the data cannot distinguish from it. Empty unless the verdict is `record`.

@@ -6,8 +6,8 @@
 //! | a cause outside the catalogue is the most probable, or the most probable set predicts test trials no better than no effect | `unknown` |
 //! | effects are the most probable, the gap is relevant, and only noise and model discrepancy are left | `effect` |
 //! | the same, but more is left, or the strongest effect is at an end of its range | `partial` |
-//! | that nothing is missing is the most probable, or the gap is too small to matter; there is a relevant gap as shipped, and re-tuning reduces it | `parameters` |
-//! | the same, but there is no relevant gap as shipped, or nothing can be re-tuned | `no_gap` |
+//! | the hypothesis that nothing is missing is the most probable, or the gap is too small to matter; and the gap as shipped is relevant, and re-tuning reduces it | `parameters` |
+//! | the same, but the gap as shipped is not relevant, or no parameter can be re-tuned | `no_gap` |
 //!
 //! A gap is relevant from `least_gap` on. Noise and discrepancy leave at most [`allowed`]. Two
 //! checks override the posterior with `unknown`, because no likelihood is available for them:
@@ -45,7 +45,7 @@ pub(crate) struct Case<'a> {
     pub(crate) simulator: &'a dyn Simulator,
     pub(crate) evidence: &'a Evidence,
     pub(crate) posterior: &'a Posterior,
-    /// The most probable first. The set without effects follows the sets with effects.
+    /// Sets of effects, the most probable first. The set without effects comes last.
     pub(crate) candidates: &'a [Candidate],
     /// Share of each effect of the best set, the strongest first.
     pub(crate) shares: &'a [EffectShare],
@@ -82,8 +82,8 @@ pub(super) fn most_probable(case: &Case<'_>, thresholds: &Thresholds) -> Verdict
     let (nothing, effects) = (case.posterior.nothing(), case.posterior.effects());
     let Excess { raw, retuned, .. } = case.evidence.gap;
     let first = case.posterior.sets.iter().find(|w| !w.hypothesis.effects.is_empty());
-    // A set that predicts trials that were not fitted no better than the simulator without it makes
-    // up for something else.
+    // A set that does not improve the prediction of trials that were not fitted only compensates
+    // for another cause.
     let is_useless = case.candidates.first().is_some_and(|c| c.closed <= 0.0);
     if !case.gross.is_empty() {
         VerdictKind::Record
@@ -110,7 +110,7 @@ pub(super) fn most_probable(case: &Case<'_>, thresholds: &Thresholds) -> Verdict
 /// Returns the parameters at the ends of their tolerances, if they override the answer.
 fn at_bounds<'a>(case: &Case<'a>) -> Option<&'a AtBounds> {
     let found = case.sanity.at_bounds.as_ref()?;
-    // The effects are kept if they leave less than free parameters would.
+    // Effects that leave less than the parameters with wider tolerances are kept.
     let is_effect = found.rivals.is_some_and(|(effects, loose)| loose > effects);
     (!is_effect).then_some(found)
 }

@@ -15,9 +15,9 @@ pub enum NoteCode {
     Doubt,
     /// What was done to the recordings, and which effects are not looked for.
     Recording,
-    /// What the simulator reports, and how it answered.
+    /// Messages and answers of the simulator.
     Simulator,
-    /// There is no test trial, so that the end of every trial is tested on.
+    /// There is no test trial, so the end of every trial is used for testing.
     NoTestTrial,
     /// Most of a channel is not simulated.
     NotSimulated,
@@ -53,7 +53,7 @@ pub enum NoteCode {
     UnusedParameters,
     /// The budget of runs was spent.
     BudgetSpent,
-    /// How strong an effect would have to be for it to be named.
+    /// Smallest strengths at which effects would be named.
     DetectionLimits,
 }
 

@@ -10,7 +10,7 @@
 //! let (diagnosis, evidence) = toy.measured(1).diagnosed();
 //! ```
 
-#![allow(dead_code, unused_imports)] // The program of the tests from outside and that of the unit tests use a part each.
+#![allow(dead_code, unused_imports)] // The integration tests and the unit tests each use only a part of this module.
 
 mod laboratory;
 mod laws;

@@ -210,8 +210,9 @@ mod tests {
         }
     }
 
-    /// If there are two slices, each is the rest for the other. One is worse by as much as the
-    /// other is better, with the same variance.
+    /// If there are two slices, each is the rest for the other. The differences of both from the
+    /// rest are equal with opposite signs, and have the same variance. Therefore the p-values add
+    /// up to 1.
     #[test]
     fn of_two_slices_one_p_value_is_the_others_complement() {
         let mut random = RandomGenerator::new(2, 0);

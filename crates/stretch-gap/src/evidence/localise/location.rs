@@ -10,8 +10,8 @@ pub struct StageGap {
     pub stage: String,
     /// Output channel.
     pub channel: String,
-    /// Share of the gap of the re-tuned nominal simulator whose cause is here: what named effects
-    /// of this stage close, and what is left in it.
+    /// Share of the gap of the re-tuned nominal simulator whose cause is in this stage: the part
+    /// that named effects of this stage close, and the part that is left in it.
     pub share: f64,
     /// Excess with the parameters as shipped.
     pub raw: f64,
@@ -27,8 +27,9 @@ pub struct StageGap {
     pub floor_source: String,
     /// Unit of `rms` and `floor`.
     pub unit: String,
-    /// Whether the entry is not a stage of the simulator but a cause of the gap, such as the reference sensor that
-    /// measures lengths. Its numbers are then what its effects close in the channels in which they show.
+    /// Whether the entry is not a stage of the simulator but a cause of the gap, such as the
+    /// reference sensor that measures lengths. Its numbers then give how much its effects close in
+    /// the channels that they change.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub is_cause_only: bool,
 }
@@ -48,7 +49,7 @@ pub struct SliceGap {
     pub excess: f64,
     /// 95 % interval of the excess.
     pub excess_ci: [f64; 2],
-    /// Whether it is significant after a false-discovery correction.
+    /// Whether the excess is significant after a false-discovery correction.
     pub stands_out: bool,
 }
 

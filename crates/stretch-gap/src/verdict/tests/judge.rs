@@ -216,7 +216,8 @@ fn parameters_at_their_ends_and_a_short_record_carry_no_name() {
     let (_, record) = bench.judged(gap, p, |case| case.gross = gross);
     assert_eq!((record.kind(), record.gross().len()), (Record, 1));
     for (rivals, is_kept) in [(Some((0.1, 0.05)), false), (None, false), (Some((0.1, 4.0)), true)] {
-        // Free parameters that leave more than the effects do do not override them.
+        // If the parameters with wider tolerances leave more than the effects, the effects are
+        // kept.
         let sanity: &'static Sanity = Box::leak(Box::new(ended(rivals)));
         let (seen, answer) = bench.judged(gap, p, |case| case.sanity = sanity);
         assert_eq!((seen, answer.kind()), (Effect, if is_kept { Effect } else { Unknown }));

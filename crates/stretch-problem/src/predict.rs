@@ -57,8 +57,8 @@ pub struct PredictedTrial {
     pub seconds: f64,
     /// Its outputs, in the order of the stages.
     pub outputs: Vec<PredictedOutput>,
-    /// Columns and rates that leave the range in which the fix was fitted, in sentences: do not
-    /// trust the prediction there.
+    /// Columns and rates that leave the range in which the fix was fitted, in sentences. The
+    /// prediction is unreliable there.
     pub extrapolated: Vec<String>,
 }
 

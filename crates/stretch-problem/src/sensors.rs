@@ -15,7 +15,8 @@ use crate::{
     error::ProblemError,
 };
 
-/// Tolerance of offset and gain, in ranges of the signal, so that both are practically free.
+/// Tolerance of offset and gain, in ranges of the signal. It is so large that both are practically
+/// free.
 const FREE: f64 = 3.0;
 
 /// Builds a problem from several sensors that one recorder recorded together with one reference. The model of each

@@ -2,8 +2,8 @@
 //! the simulator and used on the rig.
 //!
 //! The *transfer gap* is a difference of two errors on measured test trials: that of a calibration trained in the
-//! simulator minus that of a calibration trained on measured trials. It matters to a user more than the chi-square: a
-//! true effect can close the gap without any change of the calibration's error.
+//! simulator minus that of a calibration trained on measured trials. For a user it is more important than the
+//! chi-square, because a true effect can close the gap without any change of the calibration's error.
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 

@@ -122,12 +122,13 @@ pub(crate) fn placed(
     Ok(all)
 }
 
-/// Largest distance of a value from a grid, in steps, and the least number of different values, for a column whose
-/// values are said to be on the grid.
+/// The values of a column are on a grid if no value is farther from the grid than [`OFF_GRID`] steps, and if there
+/// are at least [`LEVELS`] different values.
 const OFF_GRID: f64 = 0.1;
 const LEVELS: usize = 10;
 
-/// Why a kind that `all` leaves out may be needed: the values of an output are on a coarse grid.
+/// Returns a note that a kind that `all` leaves out may be needed, because the values of an output
+/// are on a coarse grid.
 fn not_usual(kind: &Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Option<String> {
     if kind.name != QUANTISATION.name || site.side != Side::Output {
         return None;
@@ -158,7 +159,7 @@ fn refused(pattern: &str, all: &[Placed], among: &Among<'_>) -> ProblemError {
             "give the stage velocity = \"COLUMN\", or position = \"COLUMN\", from which the velocity is computed",
         );
     }
-    // 50 names would hide what to do
+    // lists places and kinds, because a list of 50 names would be too long
     let place = |p: &Placed| Some(format!("{}KIND", &p.name[..p.name.rfind(p.kind.name)?]));
     let distinct = |mut names: Vec<String>| {
         let mut seen = BTreeSet::new();
@@ -220,8 +221,8 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
         );
         let other = load.map(|(_, name)| name);
         let label = other.map_or(kind.name.to_owned(), |other| format!("{}({other})", kind.name));
-        // What the only input of a stage adds to its output is a gain or a part of the simulator, so
-        // `all` does not include it.
+        // If a stage has only one input, crosstalk from this input to the output is a gain or a part
+        // of the simulator. Therefore `all` does not include it.
         let inputs = among.stages[site.stage].inputs.iter().map(String::as_str);
         let is_own = kind.beside == Beside::Another
             && site.side == Side::Output
@@ -268,7 +269,8 @@ fn at(kind: &'static Kind, site: &Site, extent: Extent, among: &Among<'_>) -> Ve
     loads.filter(|(x, _)| moves(x)).map(|load| with(Some(rubs), Some(load))).collect()
 }
 
-/// Why a kind is not looked for on a channel, in a sentence; `None` without a reason to report.
+/// Returns a sentence on why a kind is not looked for on a channel; `None` if there is nothing to
+/// report.
 fn lack(kind: &Kind, site: &Site, sites: &[Site], among: &Among<'_>) -> Option<String> {
     let stage = &among.stages[site.stage].name;
     let own = || sites.iter().filter(|other| other.stage == site.stage);

@@ -1,5 +1,5 @@
-//! A budget of runs ends in a diagnosis, or in a refusal that says which budget is the least, and
-//! never in anything else.
+//! With any budget of runs, the result is a diagnosis or an error that states the smallest
+//! sufficient budget.
 
 use std::sync::{
     Arc,

@@ -21,7 +21,7 @@ fn pendulum(drag: f64, dry: f64, torque: &[f64]) -> Vec<f64> {
             let push = u - drag * v - 20.0 * x.sin();
             let rubs = dry * (v / 1e-3).tanh();
             let next = v + DT_S / 20.0 * (push - rubs);
-            // it sticks where friction would turn it back
+            // the joint sticks if friction would reverse the motion
             v = if dry > 0.0 && v * next <= 0.0 && push.abs() < dry { 0.0 } else { next };
             x += DT_S / 20.0 * v;
         }

@@ -299,8 +299,8 @@ fn a_simulator_that_has_the_effect_agrees_and_is_not_offered_it_again() {
         let rig = with_effect(entry);
         let pressure = seed % 2 == 0;
         let trials = session(&own_rig(), &rig.effects, pressure, 11 + seed as u64);
-        // The first trial, which starts without any motion before it, is left out, because a
-        // measured rig has moved before.
+        // The first trial is left out, because it starts without a previous motion, unlike the
+        // trials of a measured rig.
         let session = RigSession::new(&trials[1..]).expect("a session");
         let simulator =
             RigSimulator::new(RigSetup { session, rig, catalogue: &Catalogue::default() })

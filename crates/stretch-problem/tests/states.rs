@@ -125,8 +125,8 @@ fn an_overflow_is_named_with_its_level() {
     is_overflow(&diagnosed(5.0, 12.0), 5.0);
 }
 
-/// The declared range goes far beyond the levels that are reached. Of the starts of the search, at
-/// 28.5, 24, 12 and 3 cm, three have no effect, and the last one has far too much.
+/// The declared range goes far beyond the levels that are reached. The search starts at 28.5, 24,
+/// 12 and 3 cm. At the first three the effect changes nothing; at the last it changes far too much.
 #[test]
 fn an_overflow_is_named_where_most_of_its_range_does_nothing() {
     for spill in [5.0, 6.0, 7.0] {

@@ -25,7 +25,7 @@ fn turntable([kp, kd]: [f64; 2], command: &[f64]) -> Vec<f64> {
     command.iter().map(step).collect()
 }
 
-/// A command that turns now this way, now that way.
+/// A command that turns in both directions.
 fn command(trial: u64) -> Vec<f64> {
     let mut random = RandomGenerator::new(7 + trial, 0);
     let (mut u, mut rate) = (0.0, 0.0);

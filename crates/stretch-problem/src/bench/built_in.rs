@@ -12,7 +12,8 @@ use crate::{
     problem::Diagnosable,
 };
 
-/// What a whole rig and a gauge alone do differently with the results of a diagnosis.
+/// Parts of the results of a diagnosis that a whole rig and a gauge alone compute in different
+/// ways.
 pub(crate) trait BuiltIn: Laboratory {
     /// The recording and the effects.
     fn bench(&self) -> &Bench;
@@ -23,7 +24,8 @@ pub(crate) trait BuiltIn: Laboratory {
     /// Size of a spectral line of unit amplitude in the sensor's signal.
     fn line_unit(&self, model: &Model) -> f64;
 
-    /// Values of an effect within the limits of a file, because rounding may put a value outside of its range.
+    /// Limits the values of an effect to the ranges of a file, because rounding may put a value outside of its
+    /// range.
     fn within(_: &Effect, values: &[f64]) -> Vec<f64> {
         values.to_vec()
     }
@@ -32,7 +34,7 @@ pub(crate) trait BuiltIn: Laboratory {
     /// omits the parameters of the recording.
     ///
     /// # Errors
-    /// A file that could not be read again.
+    /// The written file cannot be read again.
     fn file(
         &self,
         chosen: &Chosen<'_>,

@@ -78,9 +78,9 @@ impl Columns {
         })
     }
 
-    /// Columns of a simulator with so many `outputs`. The trials are brought onto one even grid, without parts of fewer
-    /// than `shortest` samples. Recordings that are too long are cut, and isolated outliers of the columns of `sensors` are
-    /// replaced before, because the grid would spread an outlier over its neighbours.
+    /// Reads the columns of a simulator with this number of `outputs`. The trials are brought onto one even grid,
+    /// without parts of fewer than `shortest` samples. Recordings that are too long are cut, and isolated outliers of
+    /// the columns of `sensors` are replaced before, because the grid would spread an outlier over its neighbours.
     ///
     /// # Errors
     /// Columns that are missing, trials of different rates or of no plausible rate, and no trial that may be fitted.
@@ -108,7 +108,7 @@ impl Columns {
                 "record at least 10 s to fit and 5 s to test on, without gaps",
             ));
         }
-        // Time stamps outside of these limits are in another unit.
+        // A sample time outside of these limits means that the time stamps are in another unit.
         if !(1e-7..=1e3).contains(&columns.dt_s) {
             let hint = "rates from 0.001 to 10 000 000 Hz are understood; is the time in seconds?";
             let found = format!("a sample every {} s", columns.dt_s);

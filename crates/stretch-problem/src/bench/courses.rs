@@ -19,8 +19,9 @@ pub(crate) fn course(points: &[(f64, f64)], dt_s: f64) -> impl Iterator<Item = f
     })
 }
 
-/// Points with more time where a change by 1 would otherwise take less than `least_s` at the greatest
-/// rate of [`course`], which is 1.5 times the mean rate between two points.
+/// Returns the points, with more time for each move in which a change by 1 would take less than
+/// `least_s` at the greatest rate. The greatest rate of a [`course`] is 1.5 times the mean rate
+/// between two points.
 pub(crate) fn paced(points: &[(f64, f64)], least_s: f64) -> Points {
     let mut before = points.first().map_or(0.0, |point| point.0);
     let slowed = |&(share, seconds): &(f64, f64)| {
@@ -80,8 +81,8 @@ pub(crate) fn moving() -> Vec<Candidate> {
 mod tests {
     use super::*;
 
-    /// A limit of half the range per second. The number of samples of a move is rounded, so its rate may exceed the limit by up to
-    /// 2 %.
+    /// The limit is half the range per second. The number of samples of a move is rounded, so the rate may exceed the
+    /// limit by up to 2 %.
     #[test]
     fn a_paced_course_goes_the_same_way_no_faster_than_its_limit() {
         const DT_S: f64 = 0.01;
@@ -96,7 +97,7 @@ mod tests {
             let same =
                 |(one, other): (&(f64, f64), &(f64, f64))| one.0 == other.0 && one.1 <= other.1;
             assert!(points.iter().zip(&slowed).all(same), "{name}");
-            // what is slow enough stays as it is
+            // a course that is slow enough is not changed
             assert_eq!(paced(&points, 1e-3), points);
         }
     }

@@ -42,8 +42,8 @@ pub(crate) struct Bench {
 }
 
 impl Bench {
-    /// Describes a simulator whose last stage is the sensor. Of the `candidates`, the simulator lacks the effects that it
-    /// does not have and that the recording can show.
+    /// Describes a simulator whose last stage is the sensor. The effects that are looked for are the `candidates` that
+    /// the simulator does not have and that the recording can show.
     pub(crate) fn new(
         (stages, parameters): (Vec<StageSpec>, Vec<ParameterSpec>),
         mut columns: Columns,

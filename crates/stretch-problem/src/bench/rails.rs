@@ -11,8 +11,8 @@ const SHARE: f64 = 0.002;
 /// value at rest.
 const NOISY: f64 = 0.3;
 
-/// Marks the samples at an end of a column as lost, if more are there than noise explains. Adds a doubt for each such end.
-/// `noise` is that of the column's recorder.
+/// Marks the samples at an end of a column's range as lost, if there are more such samples than noise explains. Adds a
+/// doubt for each such end. `noise` is that of the column's recorder.
 pub(crate) fn leave_out_rails(columns: &mut Columns, name: &str, noise: f64) {
     let values = columns.all(name).to_vec();
     let (low, high) = ends(&values);

@@ -55,7 +55,8 @@ pub(crate) fn skew_of(about: &Description, usual: [f64; 2]) -> [f64; 2] {
     skew.and_then(|e| e.parameters.first()).map_or(usual, |p| [p.min, p.max])
 }
 
-/// A note on an effect that a sample rate (Hz) cannot show, because it needs another one.
+/// Returns a note on an effect that cannot be seen at a sample rate (Hz) because it needs a higher
+/// rate.
 pub(crate) fn too_slow(name: &str, rate_hz: f64, needed_hz: f64) -> String {
     format!(
         "{name} is not looked for, because at {} samples a second it cannot be distinguished from other causes; record at \

@@ -181,8 +181,8 @@ fn recorder(
     })
 }
 
-/// The user's own effects that are looked for, and the values of the arguments of all own effects
-/// in a run that tries none of them.
+/// Returns the user's own effects that are looked for, and the values of the arguments of all own
+/// effects in a run without these effects.
 pub(crate) fn own_effects(
     effects: &[OwnEffect],
     stages: &[StageEntry],

@@ -1,9 +1,9 @@
 //! Finds two errors in the entry `stages` of parameters: a parameter that moves the output of a stage that it does not
 //! name, and a stage whose output none of its parameters moves.
 //!
-//! A diagnosis re-tunes a parameter only by the stages that its `stages` name. If a simulator answers all stages at
-//! once, the runs for the sensitivities hold the outputs of the other stages as well. The change of output t for one
-//! tolerance sd of a parameter, in multiples of the noise sd_t of that output, is
+//! A diagnosis re-tunes a parameter only with the outputs of the stages in its entry `stages`. If a simulator
+//! answers all stages at once, the runs for the sensitivities hold the outputs of the other stages as well. The
+//! change of output t for one tolerance sd of a parameter, in multiples of the noise sd_t of that output, is
 //!
 //! ```text
 //! sqrt(mean of (y_t(p + d) - y_t(p))^2) sd/(|d| sd_t)

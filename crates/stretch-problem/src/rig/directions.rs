@@ -19,7 +19,8 @@ const FARTHEST_S: f64 = 10.0;
 /// Smallest share of the sum of squares that an error must explain to be named.
 const LEAST: f64 = 0.1;
 
-/// The wrong column and a hint, for measurements in which the muscle lengthens while the inlet is open.
+/// Returns the wrong column and a hint, for measurements in which the muscle lengthens while the inlet
+/// is open.
 ///
 /// A swapped, negative or inverted length is recognised first. Otherwise the model
 /// `dx/dt = a u_in (1 - x) - b u_out x` (`x` from empty to full, `u` the openings) is fitted to the
@@ -83,7 +84,7 @@ pub(super) fn against(trials: &[Motion<'_>], dt_s: f64) -> (&'static str, String
 enum Wrong {
     Exchanged,
     Reversed,
-    /// The commands are recorded so many seconds late.
+    /// The commands are recorded late by this time, s.
     Shifted(f64),
 }
 

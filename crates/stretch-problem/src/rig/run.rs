@@ -229,7 +229,7 @@ impl Setting<'_> {
         Some(given[self.rig.bench.columns.ranges[trial].clone()].to_vec())
     }
 
-    /// Visits every trial with its part of the output.
+    /// Calls a function for every trial with its part of the output.
     pub(super) fn each(
         &self,
         count: usize,

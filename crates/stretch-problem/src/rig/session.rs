@@ -220,9 +220,9 @@ impl RigSession {
 /// The state of the chamber at the start of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Begin {
-    /// The chamber is vented: its pressure is that of the atmosphere, as a rule a little above.
+    /// The chamber is vented: its pressure is usually a little above that of the atmosphere.
     Empty,
-    /// The chamber is filled: its pressure has settled at the supply, as a rule a little below.
+    /// The chamber is filled: its pressure has settled, usually a little below that of the supply.
     Full,
     /// The gauge pressure was measured: its value and its standard deviation, kPa.
     Pressure(f64, f64),

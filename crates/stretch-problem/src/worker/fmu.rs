@@ -15,8 +15,9 @@ const VARIABLE: &str = "STRETCH_FMU";
 const PROGRAM: &str = "stretch-fmu";
 
 impl WorkersSpec {
-    /// An FMU in a folder, run by the program `stretch-fmu`. The environment variable `STRETCH_FMU`
-    /// names this program; without it, it is looked for next to the running program, then on the `PATH`.
+    /// Returns the worker for an FMU in a folder, the program `stretch-fmu`. The environment variable
+    /// `STRETCH_FMU` names this program; without it, it is looked for next to the running program, then
+    /// on the `PATH`.
     ///
     /// `variables` holds the FMU's names of parameters, effects and columns where these differ from
     /// the problem's names; `units` holds the problem's units of parameters and effects.

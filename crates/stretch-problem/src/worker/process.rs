@@ -25,7 +25,7 @@ const LINES: usize = 12;
 const LINE_BYTES: usize = 400;
 /// Longest body, in bytes, of an answer that needs no body.
 pub(super) const NO_BODY: u64 = 1 << 16;
-/// Longest time to wait for the end of a worker.
+/// Longest time to wait until a worker has ended.
 const LEAVES: Duration = Duration::from_millis(500);
 
 type Last = Arc<Mutex<VecDeque<String>>>;
@@ -58,7 +58,7 @@ impl Process {
         let (to, asked) = channel::<Vec<u8>>();
         thread::spawn(move || {
             for bytes in asked {
-                // `exchange` notices the end of the worker while it waits for the answer.
+                // If the worker has ended, `exchange` reports this while it waits for the answer.
                 if stdin.write_all(&bytes).and_then(|()| stdin.flush()).is_err() {
                     break;
                 }
@@ -125,7 +125,7 @@ impl Process {
 
     /// The error of a worker: what happened, the exit status, and the last lines that the worker printed.
     pub(super) fn failed(&mut self, why: &str) -> String {
-        // Lines that the worker printed as it died may still be under way.
+        // The last lines that the worker printed may not have arrived yet.
         let ended = self.ended();
         thread::sleep(Duration::from_millis(20));
         let mut text = why.to_owned();

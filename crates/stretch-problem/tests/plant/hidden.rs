@@ -259,7 +259,7 @@ fn trapezoid(u: &[f64], acceleration: f64, rate: f64) -> Vec<f64> {
         let shown = y;
         for _ in 0..50 {
             let apart = u - y;
-            // Distance that is left if it brakes now.
+            // Distance to the command that remains if braking begins now.
             let past = apart - v * v.abs() / (2.0 * acceleration);
             v = (v + past.signum() * acceleration * h).clamp(-rate, rate);
             if apart.abs() < acceleration * h * h && v.abs() < 2.0 * acceleration * h {
@@ -296,7 +296,7 @@ pub(crate) fn jerk_limited(u: &[f64], limits: [f64; 3]) -> Vec<f64> {
     u.iter().map(follow).collect()
 }
 
-/// Distance until it rests, if it brakes as hard as jerk and acceleration allow.
+/// Distance until rest, with the hardest braking that jerk and acceleration allow.
 fn way_to_rest(v: f64, a: f64, [jerk, acceleration, _]: [f64; 3]) -> f64 {
     let side = (v + 0.5 * a * a.abs() / jerk).signum();
     let (mut v, mut a) = (side * v, side * a);

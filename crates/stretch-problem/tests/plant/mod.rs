@@ -157,7 +157,8 @@ fn a_servo_alone_has_no_joint_no_profile_and_no_drifting_clock() {
     assert!(diagnosis.named().is_empty(), "{:?}: {}", diagnosis.named(), diagnosis.sentence);
 }
 
-/// What the only input of a stage adds to its output is examined only if it is requested by name.
+/// Crosstalk from the only input of a stage to its output is examined only if it is requested by
+/// name.
 #[test]
 fn all_has_no_crosstalk_from_the_only_input() {
     let has_crosstalk = |wrap: &str| {
@@ -201,8 +202,8 @@ fn each_hidden_effect_is_named_within_four_hundred_runs() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-/// The search stops before the runs that the answer needs, so that what it found is not lost,
-/// wherever the budget ends.
+/// For any budget, the search stops early enough that the runs of the answer can still be made and
+/// the result of the search is kept.
 #[test]
 fn no_budget_loses_what_was_found() {
     for budget in [250, 300, 350, 500, 800, 1000] {

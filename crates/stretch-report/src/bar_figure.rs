@@ -28,7 +28,7 @@ pub struct Bar {
     pub value: f64,
     /// An interval around the end of the bar.
     pub interval: Option<[f64; 2]>,
-    /// Text behind the bar; the value when empty.
+    /// Text behind the bar; if it is empty, the value is written.
     pub text: String,
 }
 
@@ -57,7 +57,7 @@ pub enum Scale {
     NoiseMultiples,
 }
 
-/// Largest number of letters of a label on one line of a phone.
+/// Largest number of letters of a label that fit on one line of a phone's screen.
 const LETTERS: usize = 48;
 /// Height of each further line of a label, in pixels.
 const LINE: f64 = 17.0;

@@ -28,7 +28,7 @@ use super::{
 /// Largest number of trials whose curves are drawn; the tables hold all trials.
 const DRAWN: usize = 4;
 
-/// Names and sentences of a report, in addition to its numbers.
+/// The texts of a report: names and sentences.
 #[derive(Debug, Clone, Default)]
 pub struct Context {
     /// Heading of the page.
@@ -42,7 +42,8 @@ pub struct Context {
     pub signal_choice: Vec<Candidate>,
     /// Sentences about the data: their source, and changes that were made to them.
     pub notes: Vec<String>,
-    /// Errors on the trials of each kind, by the name of the kind, where there are several kinds.
+    /// Errors on the trials of each kind, with the name of the kind; empty if there is only one
+    /// kind.
     pub kinds: Vec<(String, Vec<MethodErrors>)>,
 }
 
@@ -132,7 +133,7 @@ pub(crate) fn calibration_sections(page: &mut Page, subject: &Judged<'_>) {
     let trials = &evaluation.trials;
     let is_table = !trials.is_empty() && trials.iter().all(|trial| are_row_numbers(&trial.time_s));
     let liveliest = with_most_motion(&evaluation.trials);
-    // The rows of a table have no course over time.
+    // The rows of a table are not a function of time, so nothing is drawn over time.
     if !is_table {
         over_time(page, evaluation, liveliest, &names);
     }
@@ -163,7 +164,8 @@ pub fn calibration_verdict(judged: &Judged<'_>) -> String {
         }
         (method, _) => method.to_owned(),
     };
-    // The chosen calibration, although another one may be better on these recordings by chance.
+    // The verdict is about the chosen calibration, even if another one is by chance better on these
+    // recordings.
     let last =
         calibrated.last().and_then(|(name, _)| methods.iter().position(|m| m.method == *name));
     let chosen = last.or_else(|| best(methods)).and_then(|at| {
@@ -459,7 +461,7 @@ fn surfaces(page: &mut Page, calibrated: &[(&str, &Calibrated)]) {
     }
 }
 
-/// What is remarked on a calibration, the doubts first.
+/// Returns the remarks on a calibration, the doubts first.
 fn remarks(calibrated: &Calibrated) -> impl Iterator<Item = &String> {
     calibrated.doubts.iter().chain(&calibrated.notes)
 }

@@ -29,15 +29,15 @@ pub enum Ink {
     Grid,
     /// The measured reference.
     Truth,
-    /// The first of the compared things.
+    /// The first of several compared curves or groups.
     First,
-    /// The second of the compared things.
+    /// The second of several compared curves or groups.
     Second,
-    /// The third of the compared things.
+    /// The third of several compared curves or groups.
     Third,
-    /// The fourth of the compared things.
+    /// The fourth of several compared curves or groups.
     Fourth,
-    /// The fifth of the compared things.
+    /// The fifth of several compared curves or groups.
     Fifth,
     /// The low end of an ordered scale.
     Low,
@@ -63,7 +63,8 @@ impl Ink {
         (Self::High, "ink-high"),
     ];
 
-    /// The ink of the `index`-th of the compared things; the colours repeat after the fifth.
+    /// Returns the ink of the compared curve or group with an index; the colours repeat after the
+    /// fifth.
     pub fn of(index: usize) -> Self {
         [Self::First, Self::Second, Self::Third, Self::Fourth, Self::Fifth][index % 5]
     }
@@ -242,7 +243,7 @@ impl DrawingBackend for Canvas<'_> {
         let dots = self.dots.get_or_insert(first);
         let command = if dots.path.is_empty() { 'M' } else { 'm' };
         let (x0, y0) = dots.last;
-        // a line of no length with round ends is a dot
+        // a line of length zero with round ends is drawn as a dot
         let _ = write!(dots.path, "{command}{} {}h0", x - x0, y - y0);
         dots.last = (x, y);
         Ok(())

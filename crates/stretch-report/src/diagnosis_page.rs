@@ -81,9 +81,9 @@ pub(crate) fn diagnosis_sections(page: &mut Page, subject: &Subject<'_>) {
 }
 
 /// Caption of the figure in which a reader can vary the parameters of an effect.
-const TURNED: &str = "What is left on the test trials when one number of the effect is changed and all others stay as fitted; the dot \
-    is the fit. The corners of the line are the values that were simulated. If several numbers are changed at once, their changes are \
-    added.";
+const TURNED: &str = "The root mean square residual on the test trials when one parameter of the effect is changed and all others \
+    keep their fitted values; the dot is the fit. The corners of the line are the values that were simulated. If several parameters are \
+    changed at once, their changes are added.";
 
 /// Adds the first picture, which shows the evidence for the headline.
 fn left_over(page: &mut Page, subject: &Subject<'_>) {

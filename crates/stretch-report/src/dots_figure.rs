@@ -1,5 +1,5 @@
-//! Samples as dots against a place (level or rate), one panel for each series, with the median of the samples and the
-//! band that holds 80 % of them.
+//! Draws samples as dots over a place (level or rate), with one panel for each series. Each panel also shows the
+//! median of the samples and the band that contains 80 % of them.
 
 use std::ops::Range;
 
@@ -98,7 +98,8 @@ fn draw(area: &Area<'_>, against: &Shared<'_>, panel: &Dots, is_last: bool) -> D
     })
 }
 
-/// Picks dots from every part of the axis, because most samples of a recording are at rest, in one place.
+/// Picks dots from every part of the axis. Otherwise most dots would be in one place, because most
+/// samples of a recording are at rest.
 fn spread_over(points: &[(f64, f64)], against: &Shared<'_>) -> Vec<(f64, f64)> {
     let x = &against.x;
     let width = (x.end - x.start) / SLOTS as f64;

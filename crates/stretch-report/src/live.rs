@@ -1,9 +1,9 @@
 //! The data of a figure for the script of a page, as compact JSON.
 //!
 //! A curve is given on an even grid of time, once over the whole recording and once on a finer grid around the first
-//! view. If a slot of the grid holds several samples, it gives the least and the greatest of them in their order, so
-//! that no peak is lost. Values are whole multiples of `q` above `o`. Each value is given as the difference from the
-//! value before.
+//! view. If a slot of the grid contains several samples, its two values are the smallest and the greatest of them in
+//! the order of time, so that no peak is lost. A value is `o` plus an integer times `q`. Each integer is stored as
+//! the difference from the previous one.
 
 use std::ops::Range;
 
@@ -102,7 +102,8 @@ fn ends(part: &[(f64, f64)]) -> Option<[f64; 2]> {
     Some(if low.0 <= high.0 { [low.1, high.1] } else { [high.1, low.1] })
 }
 
-/// The mean of a slot's samples, twice, because a change moves both values.
+/// Returns the mean of a slot's samples twice, because a change of the parameter changes both
+/// values of the slot.
 fn mean(part: &[(f64, f64)]) -> Option<[f64; 2]> {
     let mean = part.iter().map(|p| p.1).sum::<f64>() / part.len() as f64;
     mean.is_finite().then_some([mean; 2])

@@ -82,7 +82,7 @@ pub(crate) fn loop_figure(name: &str, calibrated: &Calibrated, unit: &str) -> Fi
             let triangle = |t: f64| 1.0 - (2.0 * (t / period_s).fract() - 1.0).abs();
             let answer = Answer::new(calibration, 3.0 * period_s, triangle)?;
             let pairs = answer.time_s.iter().zip(&answer.signal).zip(&answer.estimate);
-            // the last period, in which the initial state is forgotten
+            // only the last period is drawn, because the initial state has decayed by then
             let last = pairs.filter(|((t, _), y)| **t >= 2.0 * period_s && y.is_finite());
             Some(last.map(|((_, x), y)| (*x, *y)).collect())
         })

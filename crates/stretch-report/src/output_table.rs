@@ -8,7 +8,7 @@ use super::{
     page::Table,
 };
 
-/// Number of parameters that are shown for an output: those that moved most.
+/// Number of parameters that are shown for an output; these are the ones that moved most.
 const MOVED: usize = 3;
 /// A parameter counts as moved from this many standard deviations on.
 const LEAST_MOVED: f64 = 1.0;

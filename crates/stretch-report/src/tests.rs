@@ -146,12 +146,12 @@ fn a_page_is_one_well_formed_file_with_every_figure() {
     let page = made.page(&context("tuesday"));
     let all = elements(&page);
     let count = |name: &str| all.iter().filter(|e| *e == name).count();
-    // twice over time, signal and reference, errors twice, two surfaces, two cuts
+    // two time plots, signal against reference, two plots of errors, two surfaces, two cuts
     assert_eq!(count("figure"), 9);
-    // three of them in a shape for phones and one for desktops
+    // three of the figures have two drawings, one for phones and one for desktops
     assert_eq!(count("svg"), 12);
     assert!(!page.contains("class=\"missing\""));
-    // methods, comparisons, signals; coefficients of three fits, orders of two
+    // tables of methods, comparisons and signals; of the coefficients of three fits; and of the orders of two fits
     assert_eq!(count("table"), 8);
     assert_numbers(&page);
 }
@@ -401,7 +401,7 @@ fn a_thinned_curve_keeps_its_peaks_and_its_holes() {
     assert!(points.contains(&(time[3_333], 7.0)));
     assert!(points.windows(2).all(|w| w[0].0 < w[1].0));
     assert!(points.iter().all(|(t, _)| !(time[6_000]..time[6_200]).contains(t)));
-    // a jump in time is a hole too
+    // a jump in time also interrupts the curve
     let leap = [0.0, 0.01, 0.02, 9.0, 9.01, 9.02].map(|t: f64| t);
     let dense: Vec<f64> = (0..400).map(|n| n as f64 * 0.01).chain(leap.map(|t| t + 50.0)).collect();
     assert_eq!(thin::curve(&dense, &vec![1.0; dense.len()], &(0.0..60.0), 50).len(), 3);

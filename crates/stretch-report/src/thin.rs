@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// Smallest and largest finite value, or nothing.
+/// Returns the smallest and the largest finite value; `None` if there is no finite value.
 pub(crate) fn extent(values: impl IntoIterator<Item = f64>) -> Option<Range<f64>> {
     let ends = values
         .into_iter()
@@ -24,7 +24,7 @@ pub(crate) fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     sorted
 }
 
-/// The value below which a share `q` of sorted values lies; NaN without any.
+/// Returns the value below which a share `q` of sorted values lies; NaN if there are no values.
 pub(crate) fn quantile(sorted: &[f64], q: f64) -> f64 {
     let last = sorted.len().saturating_sub(1) as f64;
     sorted.get((q * last).round() as usize).copied().unwrap_or(f64::NAN)
@@ -73,7 +73,8 @@ fn peaks(run: &[(f64, f64)], slot: impl Fn(f64) -> usize) -> Vec<(f64, f64)> {
     points
 }
 
-/// At most `most` of the items, spread evenly but not in step with a periodic motion.
+/// Returns at most `most` of the items. They are spread evenly, but not at equal distances, which
+/// could coincide with the period of a motion.
 pub(crate) fn sample<T: Copy>(items: &[T], most: usize) -> Vec<T> {
     if items.len() <= most {
         return items.to_vec();

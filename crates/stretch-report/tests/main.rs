@@ -1,4 +1,5 @@
-//! Snapshots of reports, one program: `SNAPSHOTS=overwrite cargo test -p stretch-report --test it` writes them anew.
+//! Compares reports with snapshots. `SNAPSHOTS=overwrite cargo test -p stretch-report --test it` writes the
+//! snapshots again.
 
 mod calibrations;
 mod diagnoses;

@@ -20,7 +20,7 @@ pub const LEAST_STRAIN: f64 = 0.004;
 /// Table of a rig file that records how a simulation was run.
 const SIMULATION: &str = "simulation";
 
-/// Parameters, how far each may be wrong, and the effects that are on.
+/// Parameters with their tolerances, and the effects that are on.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rig {
     /// Values.

@@ -29,7 +29,8 @@ use crate::{
 pub struct Session {
     rig: Rig,
     settings: RunSettings,
-    /// Rate and excitation for which the rig is prepared, the rig, and its memory.
+    /// The prepared rig and its memory, with the sample rate and the excitation for which it was
+    /// prepared.
     prepared: Option<([f64; 2], Chain, ChainMemory)>,
     /// Session time at which the last trial ended, s.
     end_s: f64,
@@ -37,7 +38,8 @@ pub struct Session {
     last_kpa: f64,
 }
 
-/// Resolution of the written channels: finer than any converter, coarse enough for short numbers.
+/// Inverse resolution of the written channels. It is finer than that of any converter, and coarse
+/// enough that the numbers are short.
 const PLACES: [f64; 3] = [1e6, 1e6, 1e7];
 
 /// The longest pause that is simulated, in samples: a day at 100 Hz, which takes half a gigabyte.
@@ -82,8 +84,8 @@ impl Session {
             None => self.prepare(wanted)?,
         };
         if found != wanted {
-            // The effects are the same, so the memory fits; only the time steps and the excitation
-            // differ.
+            // The effects stay the same, so the memory can still be used. Only the time steps and
+            // the excitation change.
             chain = self.prepare(wanted)?.1;
         }
         let full_kpa = 1e-3 * self.rig.params[Key::PS];
@@ -141,7 +143,7 @@ impl Session {
 
     /// Session time at which a trial begins, and the length of the pause before it, s.
     fn clock(&self, plan: &TrialPlan) -> Result<(f64, f64), SimError> {
-        // Rounded to a millionth, because sums of sample times would print long.
+        // Rounded to a millionth, because sums of sample times would have many digits.
         let rounded = |s: f64| (s * 1e6).round() / 1e6;
         let usual = if self.trials == 0 { 0.0 } else { rounded(self.end_s + PAUSE_S) };
         let start_s = plan.start_s.unwrap_or(usual);

@@ -20,7 +20,8 @@ const SAME: f64 = 1e-9;
 const DT_S: f64 = 0.01;
 const SAMPLES: usize = 400;
 
-/// Values to try: forms neutral, usual, and a third of the way through their range.
+/// Returns the values to test: the forms are neutral, usual, or a third of the way through their
+/// range.
 fn variants(parameters: &[EffectParameter]) -> Vec<Vec<f64>> {
     let value = |which: usize| {
         move |p: &EffectParameter| match (p.role, which) {

@@ -93,7 +93,8 @@ proptest! {
         let volume = effects.find("chamber_volume").is_some();
         for (p, (l, v)) in p.iter().zip(l.iter().zip(&v)) {
             prop_assert!(p.is_finite() && l.is_finite() && v.is_finite());
-            // A chamber that is squeezed by the muscle's stretch may exceed the supply.
+            // If the volume of the chamber shrinks as the muscle lengthens, the pressure may exceed
+            // the supply.
             if !volume {
                 prop_assert!(*p >= -1e-9 && *p <= supply + 1e-9, "{p} kPa");
             }
@@ -247,8 +248,8 @@ fn limits_of_time_constants_and_widths() {
             assert!(share < RIG_STEP, "{name}: channel {c} moved by {share:e}");
         }
     }
-    // With an endless time constant, creep only reduces the stroke by a factor, and so does hysteresis with an endless
-    // width.
+    // With an infinite time constant, creep only multiplies the stroke by a factor. The same holds for hysteresis with
+    // an infinite width.
     let stroke = |x: &Channels| x[1].iter().map(|l| 180.0 - l).collect::<Vec<f64>>();
     let shares = |name: &str, values: &[f64], gain: f64| {
         let moved = stroke(&run(&extreme(name, values)));
@@ -272,7 +273,8 @@ fn symmetries_and_scaling() {
     let run = |name: &str, values: &[(&str, f64)]| {
         simulate(&RigParams::default(), &one(name, values), &inlet, &outlet, 0.0)
     };
-    // Opposite curvatures of the reference move the length by opposite amounts; both ends of the stroke stay.
+    // Opposite curvatures of the reference change the length by opposite amounts. The lengths at both ends of
+    // the stroke do not change.
     let (up, down) =
         (run("pot_nonlinearity", &[("c", 2.0)]), run("pot_nonlinearity", &[("c", -2.0)]));
     for i in 0..SAMPLES {

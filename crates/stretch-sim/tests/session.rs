@@ -271,7 +271,7 @@ fn a_gauge_alone_is_a_rig() {
 fn a_users_own_effect_takes_part() {
     use stretch_sim::{Action, Acts, Effect, EffectParameter, Operator, Place, Span};
 
-    /// Moves every tenth sample towards the sample before it.
+    /// A test effect that moves every tenth sample towards the previous one.
     #[derive(Debug)]
     struct Hold(f64);
     impl Operator for Hold {

@@ -403,8 +403,8 @@ impl Pneumatics {
         } else if empty {
             next = held.min(low);
         }
-        // The state cannot pass its equilibrium either. A step that was too long for a stiff state, or that was cut
-        // while another flow continues, ends on the equilibrium.
+        // The state cannot pass its equilibrium either. A step ends on the equilibrium if it was too long for a
+        // stiff state, or if it was shortened while another flow continues.
         if k1 * k4 < 0.0 || full || empty {
             let (end, _) = rate(next, &y, volume[1]);
             let stiff = k1 * end < 0.0 && h * (end - k1).abs() > STIFF * (next - held).abs();

@@ -47,10 +47,10 @@ pip mcap mcap-ros2-support mcap-protobuf-support rosbags 2>/dev/null || echo "SK
 pip scipy h5py 2>/dev/null || echo "SKIPPED: tests of recordings that need stretch-gap[matlab]"
 pip pyarrow 2>/dev/null || echo "SKIPPED: tests of recordings that need stretch-gap[parquet]"
 
-# from elsewhere, so that it is the installed package that is tested
+# the tests run in another folder, so that they import the installed package
 tests=$PWD/tests notebook=$PWD/examples
 cd "$fresh"
-# as in an environment that is active: a problem.toml starts workers by the name python3
+# puts the environment first on PATH, because a problem.toml starts workers with the command python3
 export PATH=$fresh/use/bin:$PATH
 "$fresh/use/bin/python" -m doctest "$tests/../README.md"
 "$fresh/use/bin/pytest" -q -p no:cacheprovider "$tests"

@@ -11,7 +11,8 @@ from scipy.optimize import least_squares
 
 import operators
 
-# arguments of each kind: (scale, off, start, most). Times are in sample times, shares as they are, all others relative to the channel
+# arguments of each kind: (scale, value that switches the effect off, start of a fit, largest value). Times are in sample times,
+# shares are dimensionless, and all others are relative to the range of the channel.
 KINDS = {
     "delay": [("time", 0.0, 2.0, 12.0)], "lag": [("time", 0.0, 3.0, 20.0)],
     "dead_zone": [("span", 0.0, 0.04, 0.3)], "saturation": [("top", 1.02, 0.8, 0.2)],

@@ -23,7 +23,7 @@ struct Args {
     /// Print the beginning of a problem.toml
     #[arg(long)]
     describe: bool,
-    /// What a parameter, an effect or a column is called in the FMU
+    /// Name in the FMU of a parameter, an effect or a column
     #[arg(long, value_name = "NAME=VARIABLE", value_parser = pair)]
     variable: Vec<(String, String)>,
     /// Unit of a parameter or an effect in the problem

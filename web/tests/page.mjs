@@ -74,7 +74,7 @@ const all = readdirSync(bench).map((name) => join(bench, name));
 /** The files that the page saves equal those of the program byte for byte. */
 const same = async () => {
   const page = await opened("same");
-  check(await page.evaluate(() => getComputedStyle(document.getElementById("recordings")).display) === "none", "nothing is shown before something is dropped");
+  check(await page.evaluate(() => getComputedStyle(document.getElementById("recordings")).display) === "none", "the page shows no results before a file is dropped");
   await drop(page, [bench]);
   check(await said(page) === "", `the data set is read: ${await said(page)}`);
   check(await page.locator("#list tr").count() === all.filter((name) => name.endsWith(".csv")).length, "every trial has its row");
@@ -131,7 +131,7 @@ const stranger = async () => {
   check(await said(page) === "", `auto: ${await said(page)}`);
   check((await page.innerText("#fitted")).startsWith("Chosen: observer"), "auto chooses");
   // the sample equals the data set that the program simulates, bit for bit
-  check((await saved(page, "save-record")).text === text(join(wanted, "observer.json")), "and fits what the program fits");
+  check((await saved(page, "save-record")).text === text(join(wanted, "observer.json")), "auto gives the same calibration as the program");
   const offered = await page.locator("#model option").count() - 1;
   const judged = await page.locator("#rows tr").count();
   check(judged >= offered, `every model is judged: ${judged} of ${offered}`);
@@ -143,7 +143,7 @@ const stranger = async () => {
   await idle(page);
   check(await page.isHidden("#diagnosed") && await said(page) === "", "a diagnosis is cancelled");
   check((await page.innerText("#cancelled")).startsWith("Cancelled: "), "and the page says so");
-  check((await saved(page, "save-record")).text === text(join(wanted, "observer.json")), "what was calibrated before stays");
+  check((await saved(page, "save-record")).text === text(join(wanted, "observer.json")), "the calibration is kept after a cancelled diagnosis");
   await page.selectOption("#subject", "gauge");
   await press(page, "diagnose");
   check((await page.innerText("#sentence")).length > 20, "the gauge alone is diagnosed after it");
@@ -165,11 +165,11 @@ const refused = async () => {
   check((await said(page)).startsWith(bad), `a bad number: ${await said(page)}`);
   await put(page, [file("empty.csv", ""), file("good.csv", `time_s,pos_mm,out_v\n${rows.join("\n")}\n`)]);
   check((await said(page)).startsWith("empty.csv"), "an empty file is named");
-  check(await page.locator("#list tr").count() === 1, "the good one stays");
-  check(await page.inputValue("#reference") === "pos_mm" && await page.inputValue("#signal") === "out_v", "units tell columns");
-  check(await page.inputValue("#model") === "auto", "the best model is what is proposed");
+  check(await page.locator("#list tr").count() === 1, "the valid file stays in the list");
+  check(await page.inputValue("#reference") === "pos_mm" && await page.inputValue("#signal") === "out_v", "columns are recognised by their units");
+  check(await page.inputValue("#model") === "auto", "the page proposes the automatic choice of a model");
   const models = await page.locator("#model option").allTextContents();
-  check(models.length > 5 && models.every((text) => text.includes(": ")), `what each model is stands beside its name: ${models.join("; ")}`);
+  check(models.length > 5 && models.every((text) => text.includes(": ")), `the list explains each model: ${models.join("; ")}`);
   await page.selectOption("#model", "linear");
   await put(page, [file("held.csv", `time_s,pos_mm,out_v\n${rows.map((row) => `${row}1`).join("\n")}\n`)]);
   await page.selectOption("#list tr:nth-child(2) select", "test");

@@ -11,7 +11,8 @@ use crate::random::RandomGenerator;
 pub(crate) enum Knee {
     /// The corner is a parabola of this half-width.
     Parabola(f64),
-    /// The slope rises from a small value (`rest`) to 1 over a width. A drawn law gives its course.
+    /// The slope rises from a small value (`rest`) to 1 over a width. The shape of this rise is a
+    /// randomly drawn curve.
     Drawn {
         /// Integral of the slope over u from -1 to 1, in half-widths, as a table over (u + 1) / 2.
         turn: Curve,

@@ -37,7 +37,7 @@ pub(crate) struct Gauge<'a> {
     softening: Option<Softening>,
     nonlinearity: Option<(f64, Law)>,
     drift: Option<(f64, Law)>,
-    /// Time constant in s, and strength and law.
+    /// Time constant, s, with the strength and the law of the heating.
     heating: Option<(f64, (f64, Law))>,
     contact: (bool, RandomGenerator),
     saturation: Option<Saturation>,

@@ -112,7 +112,7 @@ fn the_oracle_has_every_point_and_a_guess_does_not() {
     assert_eq!((figure(&figures, "exact").value, figure(&figures, "exact").low), (Some(1.0), 1.0));
     assert_eq!(figure(&figures, "nulls alarmed").value, Some(0.0));
     assert_eq!(figure(&figures, "closed, of oracle").value, Some(1.0));
-    // ten answers with probability 0.9 are all right: the calibration error is 0.1, the logarithmic
+    // ten answers with probability 0.9 are all correct: the calibration error is 0.1, the logarithmic
     // score -ln 0.9
     assert!((figure(&figures, "calibration error").value.expect("cases") - 0.1).abs() < 1e-12);
     assert!(

@@ -1,4 +1,5 @@
-//! Scatter of nulls: rigs without effects, with parameters within their tolerances.
+//! Computes the scatter of results for nulls: rigs without effects, with parameters within their
+//! tolerances.
 
 use std::{fmt::Write, num::NonZeroUsize, ops::Range};
 

@@ -60,8 +60,8 @@ pub enum Family {
 /// end of a point may be left out.
 pub type Starts = fn(&Extent) -> Vec<Vec<f64>>;
 
-/// Measured samples from which numbers may be estimated that only a recording contains. Test samples are never
-/// included.
+/// Measured samples, from which numbers that only a recording contains may be estimated. Test samples are
+/// never included.
 #[derive(Debug, Clone, Copy)]
 pub struct Measured<'a> {
     /// Samples of the trial, from its start, that may be used for fitting.

@@ -52,7 +52,7 @@ proptest! {
             run(&heats, &mut cells, start, span, &ones, 300)
         };
         let found = trial(Start::Settled, start_s);
-        prop_assert_eq!(&found, &trial(Start::Carried { rest_s: 1.0 }, 0.0), "since the trial began, not the session");
+        prop_assert_eq!(&found, &trial(Start::Carried { rest_s: 1.0 }, 0.0), "warming starts with the trial, not with the session");
         prop_assert_eq!(found[0], 1.0);
         prop_assert!(found.windows(2).all(|pair| (pair[1] - pair[0]) * h >= -ROUNDING));
         prop_assert!(found.iter().all(|y| ((y - 1.0) / h) <= 1.0 + 1e-9));

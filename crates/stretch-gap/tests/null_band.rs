@@ -1,5 +1,5 @@
-//! The gap of recordings in which nothing is missing stays within the null band. A gap above the
-//! band that no effect explains is reported.
+//! The gap of recordings in which nothing is missing stays within the null band. If the gap is
+//! above the band and no effect explains it, the gap is reported.
 
 use crate::gauge::{Gauge, Lack};
 use stretch_gap::{Diagnosis, Options, VerdictKind, diagnose};

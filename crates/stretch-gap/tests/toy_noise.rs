@@ -126,7 +126,7 @@ fn windows_tell_slow_noise_that_differences_miss() {
     let windows: Vec<Vec<f64>> = noisy.chunks(WINDOW).map(<[f64]>::to_vec).collect();
     let found = Noise::of_windows(&windows, Some(0.02), true, 0.01).expect("enough windows");
     // 100 windows of 1.28 s contain about 320 independent samples of a process with a correlation time of 0.2 s, which
-    // determine its deviation to 5 %. Parabolas remove what is slower than a window.
+    // determine its deviation to 5 %. Subtracting a parabola also removes noise that is slower than a window.
     approx::assert_relative_eq!(found.sd(), 0.1, max_relative = 0.25);
     let (share, memory) = found.slow();
     assert!(share > 0.85 && (10.0..40.0).contains(&memory), "{share} {memory}");

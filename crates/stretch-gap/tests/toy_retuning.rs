@@ -40,9 +40,9 @@ fn parameters_come_back_as_near_as_theory_says() {
     }
 }
 
-/// One observation per block is meant for noise with a correlation time of a quarter of a second. The 95 % intervals
-/// then miss one in twenty values. Of 80 values, the test allows the number of misses that a binomial count exceeds
-/// once in a thousand.
+/// A block counts as one observation. This is right for noise with a correlation time of a quarter of a second. The
+/// 95 % intervals then miss one in twenty values. Of 80 values, the test allows the number of misses that a binomial
+/// count exceeds once in a thousand.
 #[test]
 fn intervals_cover_where_noise_has_a_memory() {
     const SEEDS: u64 = 40;

@@ -148,7 +148,7 @@ impl Examined {
             seed: self.seed,
             version: env!("CARGO_PKG_VERSION"),
         };
-        // Every key is a string, so that this does not fail.
+        // This cannot fail, because every key is a string.
         serde_json::to_value(written).unwrap_or_default()
     }
 }

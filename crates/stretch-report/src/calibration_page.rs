@@ -388,11 +388,13 @@ fn errors(page: &mut Page, evaluation: &Evaluation, names: &[String], is_table: 
     page.section("Where the errors are", intro);
     let rate = (
         error_figure(evaluation, names, Against::Rate),
-        "Against the rate: what a model without a rate, or a delay, gets wrong.".to_owned(),
+        "Error over the rate: it shows the effects of a delay, and of a model without a rate."
+            .to_owned(),
     );
     let place = (
         error_figure(evaluation, names, Against::Reference),
-        "Against the reference: what a model of the wrong shape gets wrong.".to_owned(),
+        "Error over the reference: it shows the effects of a model with the wrong shape."
+            .to_owned(),
     );
     let shown = [rate, place];
     page.figures(&shown[usize::from(is_table)..]);

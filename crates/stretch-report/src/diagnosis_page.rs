@@ -144,11 +144,12 @@ fn seen(page: &mut Page, subject: &Subject<'_>) {
     }
     let level = (
         left_figure(subject, stage, Against::Level),
-        "Against the level of the motion, all trials: what has the wrong shape.".to_owned(),
+        "Over the level of the motion, all trials: this shows errors of the shape of a curve."
+            .to_owned(),
     );
     let rate = (
         left_figure(subject, stage, Against::Rate),
-        "Against its rate: what is late, slow, or depends on the direction.".to_owned(),
+        "Over the rate of the motion: this shows errors by a delay or a lag, and errors that depend on the direction.".to_owned(),
     );
     page.figures(&[level, rate]);
     page.text(

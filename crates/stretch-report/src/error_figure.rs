@@ -13,7 +13,8 @@ use super::{
 /// Largest number of dots of one method.
 const DOTS: usize = 720;
 
-/// Half the span of the difference that gives the reference's rate, in samples.
+/// Number of samples on each side of a sample in the central difference that gives the rate of the
+/// reference.
 const REACH: usize = 5;
 
 /// The quantity against which errors are drawn.

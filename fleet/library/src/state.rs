@@ -71,7 +71,7 @@ pub(crate) type Outcome<const TERMS: usize> = Result<Partial<TERMS>, Box<str>>;
 /// The content of a state.
 #[derive(Debug, Serialize, Deserialize)]
 enum Content<'a> {
-    /// The sentence of a fit that was already refused.
+    /// The error text of a fit that was refused before.
     Refusal(&'a str),
     Fit {
         /// Degree in the rate and in the signal.

@@ -29,10 +29,10 @@ use crate::{
 ///
 ///   stretch-fleet drift --lake lake --from 2026-01 --to 2026-02 --out drift.parquet
 ///
-/// Each sensor's surfaces of one month are compared with those of the other. Days are treated as
-/// independent of each other, rows of a day are not: the scatter of days about their month shows
-/// what is no drift. Of the sensors that are reported as moved a share of --false-discoveries at
-/// most is expected not to have (Benjamini and Hochberg).
+/// The surfaces of each sensor in one month are compared with those in the other month. Days are
+/// treated as independent, rows of a day are not: the scatter of the days in a month shows how
+/// much a sensor varies without a drift. Of the sensors that are reported as moved, on average at
+/// most the share --false-discoveries did not move (Benjamini and Hochberg).
 #[derive(Debug, clap::Args)]
 #[command(verbatim_doc_comment)]
 pub(crate) struct Args {

@@ -67,7 +67,7 @@ impl Pattern {
     }
 }
 
-/// What is said of the places of all trials.
+/// Options that give the places of the trials.
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct Where {
     /// Site, rig, sensor and date from the end of each path, such as {site}/{rig}/{sensor}/{date}_*.csv

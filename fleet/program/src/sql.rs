@@ -47,7 +47,7 @@ pub(crate) struct Args {
     write: bool,
 }
 
-/// Which lake, and who answers.
+/// Options that select the lake, and the machine or cluster that runs the queries.
 #[derive(Debug, Clone, clap::Args)]
 pub(crate) struct On {
     /// Folder of the lake

@@ -317,7 +317,7 @@ class Diagnosis:
 
     @property
     def note_codes(self) -> list[str]:
-        """What each of the `notes` is about, list of str in the same order, for programs: `"budget_spent"`, for example."""
+        """Codes of the `notes` for programs, list of str in the same order, for example `"budget_spent"`."""
         return [note["code"] for note in self._answer["notes"]]
 
     @property

@@ -16,8 +16,8 @@ const FIELDS: [(&str, &str); 7] = [
     ("time", "“Time column”"),
 ];
 
-/// Writes options of the program as fields of the page: `--time COLUMN:ms` becomes `“Time column” COLUMN:ms`. A command
-/// that remains is one of the program.
+/// Writes options of the program as fields of the page: `--time COLUMN:ms` becomes `“Time column” COLUMN:ms`. The text
+/// marks the command `stretch convert` as one of the program, because the page does not have it.
 pub(crate) fn in_page(text: &str) -> String {
     rename_options(text, &FIELDS).replace("stretch convert", "the program: stretch convert")
 }

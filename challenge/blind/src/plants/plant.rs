@@ -259,8 +259,8 @@ pub(super) fn relaxation(x: &[f64], share: f64, tau_s: f64, form: &Form, grid: G
     (0..x.len()).map(|i| x[i] + share * (x[i] - 0.5 * (fast[i] + slow[i]))).collect()
 }
 
-/// Drift of the zero by `change` from the start to the end of the session. The softness bends its
-/// course.
+/// Drift of the zero by `change` from the start to the end of the session. The drift is exponential
+/// in time; a larger softness makes it more curved.
 pub(super) fn drift(x: &[f64], change: f64, form: &Form, grid: Grid) -> Vec<f64> {
     let bend = 3.0 * form.softness + 1e-9;
     let shape = |t: f64| (1.0 - (-bend * t).exp()) / (1.0 - (-bend).exp());

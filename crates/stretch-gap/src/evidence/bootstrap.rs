@@ -21,8 +21,8 @@ pub(crate) struct Closed {
     pub(crate) after: f64,
     pub(crate) closed: f64,
     pub(crate) interval: [f64; 2],
-    /// Whether the mean square falls significantly: the lower end of the 95 % interval of its fall
-    /// is above 0.
+    /// Whether the effects reduce the mean square significantly: the lower end of the 95 % interval
+    /// of the reduction is above 0.
     pub(crate) falls: bool,
 }
 

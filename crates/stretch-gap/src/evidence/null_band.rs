@@ -6,8 +6,8 @@
 //! covariance of the noise and the nuisances (slow drifts and offsets). Whitened by V, the output's
 //! own noise is white noise z, whatever the nuisances are, and |z|^2 of N samples is a chi-square
 //! variable with N degrees of freedom. The noise t is the part of the measured input's
-//! noise that the simulator transmits to the output. It may be slow, and has the share u of the
-//! noise's variance. The reduced chi-square of a drawn recording is
+//! noise that the simulator transmits to the output. This part may be slow, and has the share u of
+//! the noise's variance. The reduced chi-square of a drawn recording is
 //!
 //! ```text
 //! X = ((1 - u)|z|^2 + 2 g sqrt((1 - u) t'V^-1 t) + t'V^-1 t) / N,     z ~ N(0, I), g ~ N(0, 1)

@@ -84,8 +84,8 @@ pub(crate) struct Weighed {
 /// The posterior.
 #[derive(Debug, Clone)]
 pub(crate) struct Posterior {
-    /// Sets of effects, the most probable first. The empty set, which stands for "nothing is
-    /// missing", comes last.
+    /// Sets of effects, the most probable first. The empty set, which means "nothing is missing",
+    /// comes last.
     pub(crate) sets: Vec<Weighed>,
     /// Probability of a cause outside the catalogue.
     pub(crate) unknown: f64,

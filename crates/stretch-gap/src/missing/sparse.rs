@@ -59,8 +59,8 @@ pub(crate) struct Sum {
     pub(crate) fit: Fit,
     /// Number of terms in the library.
     pub(crate) library: usize,
-    /// What a ridge regression on many terms at once leaves of the residual, from which the
-    /// nuisances were removed before.
+    /// Residual that remains after a ridge regression on many terms at once. The nuisances were
+    /// removed before.
     pub(crate) beside_many: Vec<f64>,
 }
 

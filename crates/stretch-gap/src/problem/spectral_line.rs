@@ -116,7 +116,8 @@ mod tests {
             approx::assert_relative_eq!(left(hertz, 5.0, 5.0), 1.0, max_relative = MEDIAN_SPREAD);
         }
         assert!(left(60.0, 50.0, 5.0) > 2.0);
-        // If a line is predicted but absent, only its own two of a hundred components are reduced.
+        // If a line is predicted but absent, whitening reduces only the two of a hundred components
+        // that belong to the line.
         assert!(left(60.0, 0.0, 50.0) > 0.95);
     }
 

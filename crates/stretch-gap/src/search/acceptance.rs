@@ -82,7 +82,8 @@ impl Acceptance<'_> {
         })
     }
 
-    /// Returns the gap that model discrepancy may leave of what a set closes in a stage.
+    /// Returns the part of the gap closed by a set in a stage that model discrepancy may leave
+    /// open.
     fn discrepancy(&self, base: &Hypothesis, stage: usize) -> f64 {
         let gap = |set: &Hypothesis| self.problem.gap_in(set, stage);
         self.thresholds.model_discrepancy * (gap(&self.problem.nominal) - gap(base)).max(0.0)

@@ -445,8 +445,8 @@ impl<'a> Sets<'a> {
         Ok(best)
     }
 
-    /// Returns the candidates as long as the budget of runs permits further fits. What is left of
-    /// the budget belongs to the answer.
+    /// Returns the candidates as long as the budget of runs permits further fits. The rest of the
+    /// budget is reserved for the answer.
     fn affordable<T: Send>(&self, candidates: Vec<T>) -> impl ParallelIterator<Item = T> {
         candidates.into_par_iter().filter(|_| !self.problem.is_spent())
     }

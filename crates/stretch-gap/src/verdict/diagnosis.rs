@@ -100,7 +100,7 @@ pub struct Diagnosis {
     /// out if not.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub gauge_alone: bool,
-    /// The answer with its numbers. A file also has what follows from it.
+    /// The answer with its numbers. A file also contains values that are derived from the answer.
     #[serde(flatten, serialize_with = "write_answer", deserialize_with = "read_answer")]
     #[schemars(with = "Written")]
     pub answer: Answer,
@@ -171,7 +171,7 @@ pub struct Diagnosis {
     pub runtime_s: f64,
 }
 
-/// The answer as a file has it, with what follows from it.
+/// The answer as it is written to a file, with the values that are derived from it.
 #[derive(Serialize, JsonSchema)]
 struct Written {
     /// The kind of answer.
@@ -206,7 +206,7 @@ fn write_answer<S: Serializer>(answer: &Answer, serializer: S) -> Result<S::Ok, 
     written.serialize(serializer)
 }
 
-/// Reads the answer. What follows from it is not read.
+/// Reads the answer. The values that are derived from it are not read.
 fn read_answer<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Answer, D::Error> {
     #[derive(Deserialize)]
     struct Read {

@@ -129,7 +129,8 @@ mod tests {
         // An effect that closes nothing on trials that were not fitted is not named.
         let fitted = [share("slack", 0.95), EffectShare { closes: -0.01, ..share("sag", 0.4) }];
         assert_eq!(Naming::of(&candidates, &fitted, &Thresholds::frozen()), naming);
-        // A set that closes as much is a tie, whatever its probability, and one that closes less is not.
+        // A set that closes as much of the gap is a tie, whatever its probability. A set that closes
+        // less is no tie.
         let ties = |closed| {
             let other = Candidate { closed, ..candidate(&["lowpass"], 0.001) };
             let both = [candidate(&["slip"], 0.999), other];

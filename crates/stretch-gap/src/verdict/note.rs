@@ -136,7 +136,7 @@ impl Note {
         })
     }
 
-    /// Appends an answer in which simulator and machine have these nouns.
+    /// Appends an answer. `nouns` are the words for the simulator and the machine in its sentences.
     pub(crate) fn answer(self, answer: Answer, nouns: [&'static str; 2]) -> Self {
         self.and(Piece::Answer(answer, nouns))
     }

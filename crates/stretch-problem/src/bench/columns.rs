@@ -187,9 +187,10 @@ impl Columns {
         self.turns[self.names.iter().position(|n| n == name)?]
     }
 
-    /// Shifts the columns that wrapped by whole turns in each trial. A column begins as near as possible to 0, where
-    /// simulators begin. If an input or the position of a stage wraps at the same period as its output, it begins as
-    /// near as possible to the output instead, because noise decides on which side of the jump each of them begins.
+    /// In each trial, shifts every column that wrapped by a multiple of a whole turn. A column begins as near as
+    /// possible to 0, where simulators begin. If an input or the position of a stage wraps at the same period as its
+    /// output, it begins as near as possible to the output instead, because noise decides on which side of the jump
+    /// each of them begins.
     pub(crate) fn choose_turns(&mut self, stages: &[StageEntry]) {
         let shift = |values: &mut [f64], to: f64, turn: f64| {
             let turns = turn * values.first().map_or(0.0, |x| ((x - to) / turn).round());

@@ -20,7 +20,7 @@ const KEPT: usize = 1 << 25;
 /// Smallest number of runs that are kept.
 const FEWEST: usize = 32;
 
-/// Everything that a run depends on, bit by bit.
+/// The bits of all values that a run depends on.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(crate) struct Key {
     stage: usize,

@@ -61,7 +61,7 @@ pub struct SessionColumn {
     pub values: Vec<f64>,
 }
 
-/// The number of samples in place of their range.
+/// Serialises the range of the samples of a trial as their number.
 mod number {
     use super::*;
 
@@ -77,7 +77,7 @@ mod number {
 }
 
 impl RecordedSession {
-    /// The column of that name.
+    /// Returns the column with this name.
     pub fn column(&self, name: &str) -> Option<&[f64]> {
         self.columns.iter().find(|c| c.name == name).map(|c| c.values.as_slice())
     }
@@ -119,7 +119,7 @@ pub struct AlteredColumn<'a> {
     pub values: &'a [f64],
 }
 
-/// Why a source has no answer.
+/// The reason why a source has no answer.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SourceError {
@@ -136,7 +136,7 @@ pub enum SourceError {
     Length {
         /// The stage.
         stage: String,
-        /// Number of samples that came.
+        /// Number of samples in the answer.
         found: usize,
         /// Number of samples asked for.
         needed: usize,

@@ -108,7 +108,7 @@ pub(super) fn session(session: &RecordedSession) -> Vec<u8> {
 
 /// The header of the message `session`: the session as a simulator receives it once, without the values of the columns.
 pub fn session_header(session: &RecordedSession) -> Value {
-    // Every key is a string, so that this does not fail.
+    // This cannot fail, because every key is a string.
     let mut header = serde_json::to_value(session).unwrap_or_default();
     header["kind"] = "session".into();
     header

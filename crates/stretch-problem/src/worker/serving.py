@@ -7,7 +7,7 @@ import sys
 import traceback
 
 SOURCE, SINK = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-os.dup2(2, 1)  # whatever is printed, by C code as well, goes to standard error
+os.dup2(2, 1)  # everything that is printed, also by C code, goes to standard error
 sys.path.insert(0, os.getcwd())
 
 
@@ -43,7 +43,7 @@ def bind(asked, session, body):
 
 
 def take(asked, models, body):
-    """One model after the other: stage, trials, parameters, effects, altered inputs, and places and columns of other altered inputs."""
+    """Yield stage, trials, parameters, effects, altered inputs, and places and columns of other altered inputs of each model."""
     at = 0
 
     def numbers(count):
@@ -60,14 +60,14 @@ def take(asked, models, body):
 
 
 def simulate(asked, models, body):
-    """Neighbours of one kind are one call."""
+    """Simulate the models of a request. Neighbouring models that fit into one call are simulated together."""
     kind = lambda model: (model[0], model[1], model[4] is None, model[5])
     groups = itertools.groupby(take(asked, models, body), kind)
     return [row for _, group in groups for row in answer(asked, list(group))]
 
 
 def answer(asked, group):
-    """A row for each model, or what was raised: of several models each is asked for alone then."""
+    """Return a row, or an error, for each model. If a call for several models fails, each model is simulated separately."""
     stage, trials, _, _, altered, places, _ = group[0]
     inputs = None if altered is None else list(zip(*(model[4] for model in group)))
     others = [(*place, rows) for place, rows in zip(places, zip(*(model[6] for model in group)))]

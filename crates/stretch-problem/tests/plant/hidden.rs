@@ -251,7 +251,8 @@ pub(crate) fn hidden() -> Vec<Hidden> {
     ]
 }
 
-/// A command followed with a greatest acceleration and rate: bang-bang in steps of 1/50 of a sample.
+/// Follows a command with limits of acceleration and rate (bang-bang control), in steps of 1/50 of a
+/// sample.
 fn trapezoid(u: &[f64], acceleration: f64, rate: f64) -> Vec<f64> {
     let h = DT_S / 50.0;
     let (mut y, mut v) = (u[0], 0.0_f64);
@@ -272,9 +273,10 @@ fn trapezoid(u: &[f64], acceleration: f64, rate: f64) -> Vec<f64> {
     u.iter().map(follow).collect()
 }
 
-/// A command followed as quickly as jerk, acceleration and rate allow (Haschke, Weitnauer and
-/// Ritter, doi 10.1109/IROS.2008.4650924): at every moment with full jerk towards the greatest
-/// rate, unless braking now ends beyond the command, in steps of 1/50 of a sample.
+/// Follows a command as quickly as the limits of jerk, acceleration and rate allow (Haschke,
+/// Weitnauer and Ritter, doi 10.1109/IROS.2008.4650924). The jerk has its limit at all times:
+/// towards the greatest rate, or, if braking from now on would end beyond the command, against it.
+/// A step is 1/50 of a sample.
 pub(crate) fn jerk_limited(u: &[f64], limits: [f64; 3]) -> Vec<f64> {
     let [jerk, acceleration, rate] = limits;
     let h = DT_S / 50.0;

@@ -17,7 +17,7 @@ use super::{
 };
 use crate::show::say;
 
-/// What an executor is started with.
+/// Options of an executor.
 #[derive(Debug, Clone, clap::Parser)]
 #[command(name = "stretch-executor", version, about = "Computes tasks for a scheduler")]
 pub struct ExecutorOptions {

@@ -20,7 +20,7 @@ use super::{
 };
 use crate::show::say;
 
-/// What a scheduler is started with.
+/// Options of a scheduler.
 #[derive(Debug, Clone, clap::Parser)]
 #[command(name = "stretch-scheduler", version, about = "Distributes tasks of queries to executors")]
 pub struct SchedulerOptions {

@@ -14,8 +14,8 @@ use crate::{
 /// a thousandth, so the fit leaves at most a thousandth of the distance to the optimum. Two fits
 /// therefore reduce a distance of three tolerances to 3e-6.
 const DAMPED: f64 = 1e-5;
-/// Relative: a sensitivity is a difference of outputs near 1, which are rounded by 1e-16, divided
-/// by a step of 0.03 tolerances; a tolerance is 0.05.
+/// Relative tolerance: a sensitivity is a difference of outputs near 1, which are rounded by 1e-16,
+/// divided by a step of 0.03 parameter tolerances of 0.05 each.
 const DIFFERENCED: f64 = 1e-9;
 
 /// Returns the parameters p at the minimum of sum (m - a'p)^2/(2 b sigma^2) + sum ((p - p0)/s)^2/2,

@@ -10,8 +10,8 @@ use crate::{
     toys::{Law, Toy, slow},
 };
 
-/// Relative: a dense Cholesky factor of 250 rows and a condition of up to 1e4, compared with a
-/// filter.
+/// Relative tolerance, for rounding: a filter is compared with a dense Cholesky factor of 250 rows
+/// and a condition number of up to 1e4.
 const DENSE: f64 = 1e-9;
 
 /// Returns a line whose zero drifts with the given standard deviation and correlation time.

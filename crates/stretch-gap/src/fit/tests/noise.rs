@@ -12,9 +12,9 @@ use crate::{
     toys::{Effect, Law, Measured, Toy},
 };
 
-/// Relative: three times the standard error of a standard deviation from twelve draws of 4000
-/// samples. With a lag of ten samples, every twentieth sample is independent, i.e. 2400 in total.
-/// The standard error is 1/sqrt(2 * 2400) = 1.4 %.
+/// Relative tolerance: three times the standard error of a standard deviation that is estimated
+/// from twelve draws of 4000 samples. With a lag of ten samples, every twentieth sample is
+/// independent, i.e. 2400 in total. The standard error is 1/sqrt(2 * 2400) = 1.4 %.
 const DRAWN: f64 = 0.045;
 
 fn root_mean_square(record: &Measured, stage: usize) -> f64 {

@@ -32,7 +32,7 @@ const PLAY: &str = "lag.output.backlash";
 const LAG: &str = "line.input.lag";
 const LOOP: &str = "lag.output.bouc_wen";
 
-/// What overrides an answer.
+/// A finding that overrides an answer.
 #[derive(Clone)]
 enum Overruled {
     AtBounds(AtBounds),

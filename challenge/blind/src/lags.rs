@@ -34,7 +34,7 @@ pub(crate) struct Lags {
     /// dependence. A distance of 0 means that the rate is constant.
     hurry: (f64, f64),
     settled: bool,
-    /// Dead time after the lags, s, and past values.
+    /// Dead time after the lags, s, and the past values that it needs.
     dead_s: f64,
     late: Vec<f64>,
 }

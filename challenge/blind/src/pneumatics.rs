@@ -117,8 +117,8 @@ impl DeadBand {
 
     fn draw(family: Family, random: &mut RandomGenerator) -> Self {
         let mut sides = [1.0, random.between(0.85, 1.15)];
-        // The valve is shut up to `begin` bands. Above that, the slope rises to 1; a drawn law
-        // gives its course.
+        // The valve is shut up to `begin` bands. Above that, the slope rises to 1 along a randomly
+        // drawn curve.
         let begin = if random.unit() < 0.6 { random.between(0.3, 0.85) } else { 0.0 };
         let mut law = rising(family, random);
         let mut long = (1.0 - begin) / (1.0 - law.mean());

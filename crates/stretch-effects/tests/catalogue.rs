@@ -101,8 +101,8 @@ fn is_of_records(kind: &Kind) -> bool {
 /// A time constant of 0 is replaced by 1e-9 s. The lag is then up to 2e-9 s times the quickest change: the whole span
 /// in a step of 5e-3 s.
 const NO_TIME: f64 = 1e-6;
-/// A hum rotates its wave from sample to sample and is computed anew for every block, at an angle of up to 600 s times
-/// 60 Hz.
+/// Rounding of a hum. The wave is rotated from sample to sample, and is computed again for every block, at times of up
+/// to 600 s and a frequency of up to 60 Hz.
 const ROTATED: f64 = 1e-9;
 
 proptest! {

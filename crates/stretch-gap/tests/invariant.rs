@@ -104,7 +104,7 @@ fn units_do_not_matter() {
 }
 
 /// A session that began an hour later has the same diagnosis, because clocks count from its first trial. Only a drift
-/// counts from the clock's zero; the zero of the line absorbs this offset.
+/// depends on the absolute session time; the zero of the line absorbs this offset.
 #[test]
 fn the_hour_of_the_session_does_not_matter() {
     let later = Toy { begins_s: 3600.0, ..two_stages() };

@@ -48,8 +48,8 @@ fn a_gap_at_high_level_stands_out_there() {
     let high = told.location.slices.iter().filter(|s| levels[3..].contains(&s.slice.as_str()));
     let share: f64 = high.map(|s| s.share).sum();
     // The gap is nine variances in about a tenth of 4500 samples, a sum of 4000. Each of the three lower levels has
-    // about 1200 samples, whose sum of squares has the standard deviation sqrt(2 1200) = 49. Three of these for each
-    // level are a tenth of the gap.
+    // about 1200 samples, whose sum of squares has the standard deviation sqrt(2 1200) = 49. Three standard
+    // deviations for each of the three levels are a tenth of the gap.
     assert!(share > 0.9, "{share}");
 }
 

@@ -212,24 +212,24 @@ struct WrittenEffect<'a> {
     stage: &'a str,
     /// Equation, in the names of the numbers.
     equation: &'a str,
-    /// Parameters and forms, with intervals.
+    /// Parameters and forms of the effect, with intervals.
     numbers: &'a [EffectValue],
-    /// What goes in; null for an effect that is not described as code.
+    /// Inputs of the effect; null for an effect that is not described as code.
     inputs: Option<Vec<WrittenQuantity<'a>>>,
-    /// What comes out.
+    /// Output of the effect.
     output: Option<WrittenQuantity<'a>>,
-    /// The initial state.
+    /// Initial state of the effect.
     state: Option<String>,
 }
 
-/// A quantity that goes into an effect, or comes out of it.
+/// An input or the output of an effect.
 #[derive(Serialize, JsonSchema)]
 struct WrittenQuantity<'a> {
     /// Name in the code.
     name: &'a str,
     /// Unit.
     unit: &'a str,
-    /// What it is.
+    /// Meaning of the quantity.
     meaning: &'a str,
 }
 

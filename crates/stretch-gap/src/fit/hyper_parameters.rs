@@ -251,8 +251,8 @@ mod tests {
             assert!((0.4..2.6).contains(&(found_s / time_s)), "{found_s} for {time_s}");
             assert!(gained >= 0.0);
         }
-        // The integral is below the maximum of the integrand, but not below this maximum times its
-        // share of the prior.
+        // The integral is smaller than the maximum of the likelihood, but at least this maximum
+        // times the prior probability of its level.
         let record = residual(1.0, 3.0, &drive);
         let (best, _) = metric.adapted(&roles, &record, |_| false);
         let evidence = best.evidence(&roles, &record, 1.0);

@@ -92,7 +92,7 @@ impl Ground {
     }
 }
 
-/// A column d of one stage, with what the projection needs.
+/// A column d of one stage, with a vector that is needed to project out the sensitivities.
 pub(crate) struct Projected {
     pub(crate) column: Column,
     /// L^-1 A'V^-1 d, with the factor L of A'V^-1 A + b I.

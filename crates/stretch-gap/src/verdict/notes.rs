@@ -69,7 +69,8 @@ fn gross_misfit(
     Some(Note::new(NoteCode::NotSimulated, text))
 }
 
-/// Kinds of effect at the input or the output of a machine that dry friction inside it looks like.
+/// Kinds of effect at the input or the output of a machine that resemble dry friction inside the
+/// machine.
 const LIKE_FRICTION: [&str; 5] =
     ["backlash", "dead_zone", "hysteresis", "bouc_wen", "play_friction"];
 

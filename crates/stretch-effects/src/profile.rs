@@ -53,7 +53,7 @@ pub static SLEW_LIMIT: Kind = Kind {
     words: "it cannot change faster than a rate",
     equation: "|y'| <= rate, y follows x",
     usual: &[Side::Input, Side::Output],
-    // A rate of twice the quickest change seen limits nothing.
+    // A limit of twice the quickest recorded change has no effect.
     parameters: |e, unit| {
         let off = 2.0 * e.quickest.max(1e-9 * e.span() / e.dt_s);
         vec![EffectParameter::sized("rate", &format!("{unit}/s"), 0.01 * off..=off).off_at(off)]
@@ -258,7 +258,8 @@ pub static PROFILE: Kind = Kind {
     words: "a servo follows its command with a greatest rate and a greatest acceleration (trapezoid profile, S profile where corners are rounded)",
     equation: "y = mean of p over the last round_s; |p''| <= acceleration, |p'| <= rate, p goes to x and stops there",
     usual: &[Side::Input],
-    // The acceleration that makes and stops the quickest possible change within a sample limits nothing.
+    // A limit of the acceleration has no effect if the quickest possible change can start and stop
+    // within one sample.
     parameters: |e, unit| {
         let (slow, dt) = (SLOWEST * e.late_s(), e.dt_s);
         let span = e.span().max(f64::MIN_POSITIVE);

@@ -25,7 +25,7 @@ fn what_agrees_as_shipped_has_no_gap() {
     let told = told(&Toy { trials: vec![(5000, false), (40_000, true)], ..line() }.measured(1));
     assert_eq!(told.verdict(), VerdictKind::NoGap, "{}", told.sentence);
     assert!(told.ambiguous.is_empty() && told.answer.gross().is_empty());
-    // For the 5000 fitted samples it is 0.02; the tolerance is three of these.
+    // For the 5000 fitted samples it is 0.02; the tolerance is three times that.
     assert!(told.gap.raw < 0.021 && told.gap.retuned < 0.06, "{:?}", told.gap);
 }
 

@@ -47,7 +47,7 @@ const TURN: f64 = 0.01;
 /// and v its scaled rate.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[expect(missing_docs, reason = "fields stand in the equation of their variant")]
+#[expect(missing_docs, reason = "the equation of each variant defines its fields")]
 pub enum Factor {
     /// max(0, x)^power
     Power { signal: usize, power: f64 },
@@ -95,7 +95,7 @@ pub enum Factor {
 /// How a product of factors g reaches the output.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-#[expect(missing_docs, reason = "fields stand in the equation of their variant")]
+#[expect(missing_docs, reason = "the equation of each variant defines its fields")]
 pub enum Passage {
     /// Unchanged.
     Direct,

@@ -14,7 +14,7 @@ use crate::{
 /// Largest number of names listed in a message.
 const LISTED: usize = 12;
 
-/// Additional information of a problem about its names.
+/// The entries of a problem that relate its names to an FMU: names of variables, and units.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Names {
     /// Variable of the FMU for a parameter, an effect's value or a column, if the names differ.

@@ -386,9 +386,9 @@ def main():
 
 
 ABOUT = f"""Made by `python/examples/mujoco_actuators.py --out reference/mujoco.md` with MuJoCo {mujoco.__version__}. A two-link
-arm under position control; both joints are recorded at 100 Hz for {SECONDS:.0f} s with noise of {NOISE_RAD} rad. A copy of the arm
-takes the place of the real machine; its tool and gains differ from the simulator's, within their tolerances. The equations of
-each hidden effect differ from the catalogue's. "Left" is the RMS error in multiples of the noise: noise alone gives 1.
+arm under position control; both joints are recorded at 100 Hz for {SECONDS:.0f} s with noise of {NOISE_RAD} rad. A copy of the
+arm takes the place of the real machine; its tool and gains differ from the simulator's, within their tolerances. The equations
+of each hidden effect differ from the catalogue's. "Left" is the RMS error in multiples of the noise: noise alone gives 1.
 `mujoco.sysid` fits all parameters and all seven candidates at once; the table lists the candidates whose 95 % interval excludes
 the value at which they have no effect.
 """

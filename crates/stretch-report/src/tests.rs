@@ -545,11 +545,11 @@ fn a_table_of_weights_is_not_drawn_over_time() {
     let calibrated = &[("linear", &linear)];
     let page = calibration_page(&Judged { calibrated, evaluation: &evaluation, context: &context });
     for absent in
-        ["Estimate and reference over time", "Against the rate", "half-second", "eight seconds"]
+        ["Estimate and reference over time", "Error over the rate", "half-second", "eight seconds"]
     {
         assert!(!page.contains(absent), "{absent}");
     }
-    assert!(page.contains("Signal and reference") && page.contains("Against the reference"));
+    assert!(page.contains("Signal and reference") && page.contains("Error over the reference"));
 }
 
 /// The page of several gauges has a part for each, with the sections of every calibration.

@@ -16,8 +16,8 @@ use std::{io::ErrorKind, process::ExitCode};
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind as ArgumentError};
 
 use commands::{
-    apply, calibrate, convert, demo, diagnose, effects, evaluate, export, json, listen, page,
-    problem, simulate, sleeve,
+    apply, calibrate, compare, convert, demo, diagnose, effects, evaluate, export, json, listen,
+    page, problem, simulate, sleeve,
 };
 use display::Volume;
 
@@ -71,6 +71,7 @@ enum Command {
     Apply(apply::Args),
     Evaluate(evaluate::Args),
     Convert(convert::Args),
+    Compare(compare::Args),
     Demo(demo::Args),
     Simulate(simulate::Args),
     Diagnose(diagnose::Args),
@@ -144,6 +145,7 @@ pub fn run() -> ExitCode {
         Command::Apply(args) => apply::run(args),
         Command::Evaluate(args) => evaluate::run(args),
         Command::Convert(args) => convert::run(args),
+        Command::Compare(args) => compare::run(args),
         Command::Demo(args) => demo::run(args),
         Command::Simulate(args) => simulate::run(args),
         Command::Diagnose(args) => diagnose::run(args).map(|status| done = status),

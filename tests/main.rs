@@ -2,6 +2,7 @@
 //! the tests.
 
 mod attack;
+mod compare;
 mod corpus;
 mod demo;
 mod diagnose;

@@ -281,7 +281,8 @@ fn options(command: &clap::Command) -> usize {
     command.get_arguments().filter(is_own).count() + below.map(options).sum::<usize>()
 }
 
-/// A command's help must be short, and the numbers of commands and options must remain small.
+/// A command's help must be short, and the numbers of commands and options must remain small. The
+/// fifteenth command is `compare`: it needs no simulator and no calibration, only two recordings.
 #[test]
 fn commands_and_options_are_few_and_a_short_help_fits_a_screen() {
     let program = stretch_cli::command();
@@ -290,7 +291,7 @@ fn commands_and_options_are_few_and_a_short_help_fits_a_screen() {
     let counts: Vec<_> = commands.iter().map(|c| (c.get_name(), options(c))).collect();
     let count: usize = counts.iter().map(|(_, count)| count).sum();
     assert!(
-        counts.len() <= 14 && count <= 90,
+        counts.len() <= 15 && count <= 90,
         "{} commands, {count} options: {counts:?}",
         counts.len()
     );

@@ -20,7 +20,7 @@ use serde::Deserialize;
 use stretch_data::{SessionTrial, Split, Trial};
 use stretch_gap::Options;
 use stretch_problem::{
-    BlackBox, Checked, Examined, Fixed, KINDS, Kind, Language, PAUSE_S, Prediction, Problem,
+    BlackBox, Checked, Examined, Fixed, KINDS, Kind, Language, PAUSE_S, Pair, Prediction, Problem,
     ProblemSpec, RecordedSession, Side, Source, predict_with,
     worker::{Workers, WorkersSpec, session_header},
 };
@@ -66,6 +66,8 @@ pub(crate) struct Entries {
     trials: Vec<SessionTrial>,
     /// The file that the problem was read from.
     file: Option<ProblemSpec>,
+    /// The two recordings that are compared, if there is no simulator.
+    pair: Option<Pair>,
 }
 
 /// A problem with the fix of a diagnosis in it.
@@ -119,6 +121,13 @@ impl Entries {
             spec = behind;
         }
         Self::of(spec, Some(file))
+    }
+
+    /// From two recordings that are compared, and the columns to compare.
+    #[staticmethod]
+    fn compared(a: Recording<'_>, b: Recording<'_>, columns: Vec<String>) -> PyResult<Self> {
+        let pair = Pair::new(&a.trial(), &b.trial(), &columns).map_err(said)?;
+        Ok(Self { pair: Some(pair.clone()), ..Self::of(pair.spec().clone(), None)? })
     }
 
     /// Name of the problem.
@@ -233,7 +242,7 @@ impl FixedEntries {
 impl Entries {
     fn of(spec: ProblemSpec, file: Option<ProblemSpec>) -> PyResult<Self> {
         let trials = spec.trials.clone();
-        Ok(Self { checked: Checked::new(spec).map_err(said)?, trials, file })
+        Ok(Self { checked: Checked::new(spec).map_err(said)?, trials, file, pair: None })
     }
 
     /// Runs a job on a separate thread, while the calling thread runs the simulator for it.
@@ -253,11 +262,12 @@ impl Entries {
             (Some(file), None) => file.workers(stretch_gap::threads(how.threads)).map_err(said)?,
             (None, None) => None,
         };
-        if simulator.is_none() && workers.is_none() {
+        if simulator.is_none() && workers.is_none() && self.pair.is_none() {
             return Err(said("there is no simulator; give one, or name it in the problem's file"));
         }
         let left = Arc::new(AtomicBool::new(false));
-        let work = Work { file: self.file.clone(), workers, how, main_thread, left: left.clone() };
+        let (file, pair) = (self.file.clone(), self.pair.clone());
+        let work = Work { file, pair, workers, how, main_thread, left: left.clone() };
         thread::Builder::new().name("stretch".into()).spawn(move || {
             let done = job(&work);
             drop(work.main_thread.send(Message::Done(done)));
@@ -271,6 +281,7 @@ impl Entries {
 /// Everything that the working thread needs.
 struct Work<T> {
     file: Option<ProblemSpec>,
+    pair: Option<Pair>,
     workers: Option<WorkersSpec>,
     how: How,
     /// Messages to the main thread.
@@ -280,8 +291,12 @@ struct Work<T> {
 }
 
 impl<T: Send + 'static> Work<T> {
-    /// Returns the caller's simulator, or the workers named in the problem file.
+    /// Returns the caller's simulator, the workers named in the problem file, or the recording that
+    /// plays the simulator.
     fn source(&self, session: &RecordedSession) -> Result<Arc<dyn Source>, String> {
+        if let Some(pair) = &self.pair {
+            return Ok(pair.source(session));
+        }
         if let Some(spec) = &self.workers {
             let started = Workers::start(spec.clone(), session);
             return Ok(Arc::new(started.map_err(|e| e.to_string())?));
@@ -294,7 +309,7 @@ impl<T: Send + 'static> Work<T> {
 
 impl Work<Answer> {
     fn answered(&self, checked: Checked, trials: Vec<SessionTrial>) -> Result<Answer, String> {
-        let Self { file, how, main_thread, left, .. } = self;
+        let Self { file, pair, how, main_thread, left, .. } = self;
         let source = self.source(checked.session())?;
         let budget =
             how.budget.or(file.as_ref().and_then(|file| file.budget).map(NonZeroUsize::get));
@@ -311,13 +326,13 @@ impl Work<Answer> {
         let examined = problem.examine(&options, how.experiment, &progress, &stop);
         let examined = examined.map_err(|e| e.to_string())?;
         let fixed = match &examined.fix {
-            Ok(fix) => match &fix.file {
+            Ok(fix) if pair.is_none() => match &fix.file {
                 Fixed::Problem(spec) => Some(ProblemSpec { trials, ..(**spec).clone() }),
                 Fixed::Rig(_) => None,
             },
-            Err(_) => None,
+            _ => None,
         };
-        Ok(Answer { fixed, ..answer(&problem, examined) })
+        Ok(Answer { fixed, ..answer(&problem, examined, pair.as_ref()) })
     }
 }
 
@@ -347,7 +362,7 @@ pub(crate) fn wrappers() -> Vec<(&'static str, String, &'static str, &'static st
     KINDS.iter().map(row).collect()
 }
 
-fn answer(problem: &Problem, examined: Examined) -> Answer {
+fn answer(problem: &Problem, examined: Examined, pair: Option<&Pair>) -> Answer {
     let simulator = problem.simulator();
     let curve = |(stage, e): (usize, &stretch_gap::StageEvidence)| {
         let measured = simulator.measured(stage).to_vec();
@@ -358,8 +373,12 @@ fn answer(problem: &Problem, examined: Examined) -> Answer {
     let implementations = examined.implementations.iter();
     let code =
         implementations.filter_map(|one| Some((one.name.clone(), one.code(Language::Python)?)));
+    let mut json = examined.to_json();
+    if let Some(pair) = pair {
+        json["compared"] = serde_json::json!(pair.compared(&examined));
+    }
     Answer {
-        json: examined.to_json().to_string(),
+        json: json.to_string(),
         page: diagnosis_page(&Subject::of(problem, &examined)),
         curves,
         code: code.collect(),

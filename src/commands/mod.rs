@@ -5,6 +5,7 @@ mod apply_several;
 pub(crate) mod calibrate;
 mod calibrate_sleeve;
 mod calibration_text;
+pub(crate) mod compare;
 pub(crate) mod convert;
 pub(crate) mod demo;
 pub(crate) mod diagnose;

@@ -141,6 +141,7 @@ fn pages_of_how_to_do_something_are_typed() {
     type_page("book/src/how-to/fix.md");
     type_page("book/src/how-to/ci.md");
     type_page("book/src/how-to/recordings.md");
+    type_page("book/src/how-to/compare.md");
 }
 
 #[test]

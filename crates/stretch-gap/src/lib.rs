@@ -52,6 +52,7 @@ pub use problem::{
 pub use record::{
     columns_alone::copied,
     gross::{Gross, GrossKind},
+    units::units_of_factor,
 };
 pub use stretch_effects::EffectParameter;
 pub use verdict::{

@@ -4,6 +4,7 @@ mod bench;
 mod black_box;
 mod by_trial;
 mod causes;
+mod compare;
 mod error;
 mod examine;
 mod file;
@@ -27,6 +28,7 @@ pub use black_box::{
 };
 pub use by_trial::{Apart, ByTrial, Heterogeneity, RunFit, q_values};
 pub use causes::{Causes, causes};
+pub use compare::{Compared, Estimate, Octave, Pair};
 pub use error::ProblemError;
 pub use examine::{Examined, diagnosis_schema};
 pub use file::{BuiltIn, SimulatorEntry, problem_reference, problem_schema};

@@ -1,7 +1,7 @@
 """Calibration of strain gauges, and diagnosis of the gap between a simulator and a recording.
 
 `calibrate` fits a calibration that converts the signal of a gauge to a length or an angle. `diagnose` compares a simulator with
-recordings and names the effects that the simulator lacks.
+recordings and names the effects that the simulator lacks. `compare` compares two recordings, without a simulator.
 
 >>> import numpy as np, stretch_gap
 >>> time_s = np.arange(0, 20, 0.01)
@@ -15,6 +15,7 @@ True
 
 from ._stretch import Reading, Receptor, Refused, StretchError, __version__
 from .calibration import Calibration, Estimate, calibrate
+from .compare import compare
 from .diagnosis import Diagnosis, diagnose, wrappers
 from .evaluation import Evaluation, evaluate
 from .fix import Fix, Prediction
@@ -42,6 +43,7 @@ __all__ = [
     "Trial",
     "__version__",
     "calibrate",
+    "compare",
     "convert",
     "diagnose",
     "evaluate",

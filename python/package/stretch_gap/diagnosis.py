@@ -316,6 +316,18 @@ class Diagnosis:
         return [note["text"] for note in self._answer["notes"]]
 
     @property
+    def compared(self) -> list[dict[str, Any]]:
+        """Differences of two recordings, list of dicts by column. Empty unless `compare` returned the diagnosis.
+
+        Each dict holds `a` and `b` (the columns), `sentence`, and dicts with the `value` and the 95 % `interval` of `gain`,
+        `offset`, `delay_s` (in the middle of the common time) and `clock_rate` (s/s). `units` are the units of both columns if
+        these explain the gain, else None. `difference`, `left`, `noise` and `range` are in the unit of `b`: root mean square
+        before and after gain, offset and clock are fitted, one standard deviation of the noise, and the range of the column.
+        `octaves` lists what is left by frequency, in multiples of the noise.
+        """
+        return list(self._answer.get("compared", []))
+
+    @property
     def note_codes(self) -> list[str]:
         """Codes of the `notes` for programs, list of str in the same order, for example `"budget_spent"`."""
         return [note["code"] for note in self._answer["notes"]]
@@ -557,7 +569,7 @@ class Diagnosis:
         return self._page
 
     def __repr__(self) -> str:
-        lines = textwrap.wrap(self.sentence, 100)
+        lines = [line for one in (*(c["sentence"] for c in self.compared), self.sentence) for line in textwrap.wrap(one, 100)]
         shares = sorted(self.where.items(), key=lambda item: -item[1])[:SHOWN]
         lines += ["", "share of the gap:"] + [f"  {channel:<40} {100 * share:3.0f} %" for channel, share in shares]
         likely = sorted(self.probabilities.items(), key=lambda item: -item[1])[:SHOWN]

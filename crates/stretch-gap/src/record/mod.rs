@@ -12,6 +12,6 @@ pub(crate) mod columns_alone;
 mod examine;
 pub(crate) mod gross;
 mod screen;
-mod units;
+pub(crate) mod units;
 
 pub(crate) use examine::examine;

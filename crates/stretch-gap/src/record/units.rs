@@ -51,6 +51,27 @@ pub(crate) fn units(ratio: f64, sd: f64, unit: &str) -> Option<String> {
     Some(format!("{simulated} for {recorded}"))
 }
 
+/// Returns the units of two columns, if a pair of units explains within 1 % that the second is
+/// `factor` times the first. `stated` are the units that the columns state, empty if unknown. If
+/// they state a unit, the pair contains it; otherwise the result is the first pair of the list.
+///
+/// ```
+/// use stretch_gap::units_of_factor;
+/// assert_eq!(units_of_factor(57.3, ["", ""]), Some(["rad", "deg"]));
+/// assert_eq!(units_of_factor(1000.0, ["", "mV"]), Some(["V", "mV"]));
+/// assert_eq!(units_of_factor(1.7, ["", ""]), None);
+/// ```
+pub fn units_of_factor(factor: f64, stated: [&str; 2]) -> Option<[&'static str; 2]> {
+    let stated = stated.map(written_unit);
+    let all = PAIRS.iter().flat_map(|&(a, b, f)| [([b, a], f), ([a, b], 1.0 / f)]);
+    let near = all.filter(|(_, f)| (factor.abs() / f).ln().abs() < WITHIN);
+    let fits = |units: &[&str; 2]| {
+        let known = stated.iter().zip(units).filter(|(stated, _)| !stated.is_empty());
+        known.clone().count() == 0 || known.clone().any(|(stated, unit)| stated == unit)
+    };
+    near.map(|(units, _)| units).find(fits)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

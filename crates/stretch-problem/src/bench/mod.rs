@@ -7,7 +7,7 @@ pub(crate) mod columns;
 pub(crate) mod courses;
 mod isolated_outliers;
 pub(crate) mod rails;
-mod shortened;
+pub(crate) mod shortened;
 pub(crate) mod smooth;
 mod specs;
 

@@ -1,0 +1,693 @@
+//! Compares two recordings of the same quantity. The first recording plays the simulator of the
+//! second one, with a gain, an offset, a delay and a clock rate as its parameters.
+
+use std::sync::Arc;
+
+use serde::Serialize;
+use stretch_data::{
+    Channel, EvenSession, SessionTrial, Trial, after_number, column_meant, ends, in_digits, listed,
+    unit, unit_of,
+};
+use stretch_effects::{ClockDrift, Grid, Operator, Span};
+use stretch_gap::{Noise, ParameterShift, SliceGap, units_of_factor};
+use stretch_metrics::lag;
+use stretch_sim::Tolerance;
+
+use crate::{
+    bench::{
+        columns::shortest,
+        shortened::shortened,
+        smooth::{MeasuredInput, Smoothed, unscheduled},
+    },
+    black_box::{
+        Ask, BlackBox, Checked, Parameter, ProblemSpec, RecordedSession, Source, StageEntry,
+        closure,
+    },
+    error::ProblemError,
+    examine::Examined,
+    problem::Problem,
+};
+
+/// Longest delay that the fit of the clock reaches without a shift of the recordings, s, and in samples.
+const LATE: (f64, usize) = (0.2, 20);
+/// Tolerance of the clock rate, s/s: good recorders differ by 1e-4, time stamps of a rounded rate by more.
+const CLOCK: f64 = 1e-3;
+/// Least correlation of two recordings of one motion.
+const ALIKE: f64 = 0.5;
+/// An alignment is preferred only if it reduces the unexplained part (1 - correlation) to this share.
+const BETTER: f64 = 0.5;
+/// Share of the correlation at the best lag below which the recordings are shifted before the fit.
+const NEAR: f64 = 0.9;
+/// Greatest number of samples of the cross-correlation over whole recordings.
+const COARSE: usize = 2000;
+/// Smallest noise, as a share of the range: interpolation between samples is no more accurate.
+const FLOOR: f64 = 1e-4;
+/// Longest time between two samples over which a recording is interpolated, in sample times.
+const BRIDGED: f64 = 4.5;
+/// Number of standard deviations from which a difference is put into the sentence.
+const SURE: f64 = 3.0;
+/// Number of standard deviations on either side of the mean within which 95 % of a Gaussian lie.
+const COVERS: f64 = 1.96;
+/// Parameters of each compared column.
+const PARAMETERS: [&str; 4] = ["gain", "offset", "delay", "clock"];
+
+/// Two recordings of the same quantities on one clock.
+///
+/// ```
+/// use stretch_data::{Channel, Trial};
+/// use stretch_gap::{Options, RandomGenerator};
+/// use stretch_problem::Pair;
+/// let mut random = RandomGenerator::new(1, 0);
+/// let knee = |t: f64| 40.0 + 20.0 * (1.3 * t).sin() + 10.0 * (3.1 * t).sin();
+/// let mut log = |name: &str, of: &dyn Fn(f64) -> f64| {
+///     let time_s: Vec<f64> = (0..4000).map(|i| 0.01 * f64::from(i)).collect();
+///     let values = time_s.iter().map(|t| of(*t) + 0.05 * random.gauss()).collect();
+///     Trial { name: name.into(), time_s, channels: vec![Channel { name: "knee_deg".into(), values }] }
+/// };
+/// let (a, b) = (log("a.csv", &knee), log("b.csv", &|t| 1.7 * knee(t - 0.035)));
+/// let pair = Pair::new(&a, &b, &[])?;
+/// let problem = pair.problem()?;
+/// let examined = problem.examine(&Options::default(), false, &|_| (), &|| false)?;
+/// let [knee] = &pair.compared(&examined)[..] else { panic!() };
+/// assert!((knee.gain.value - 1.7).abs() < 0.01 && (knee.delay_s.value - 0.035).abs() < 0.002);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct Pair {
+    names: [String; 2],
+    /// Compared columns, of the first and of the second recording.
+    columns: Vec<[String; 2]>,
+    /// Columns of the first recording, by part. A part extends those of the second recording by
+    /// `margin` samples on both sides.
+    parts: Vec<Vec<Vec<f64>>>,
+    margin: usize,
+    grid: Grid,
+    /// The second recording as a problem.
+    spec: ProblemSpec,
+    /// Delay of the second recording that the alignment removed, s.
+    shift_s: f64,
+    /// Correlation of each column at the best lag.
+    correlations: Vec<f64>,
+    /// Whether the two columns are equal in every sample.
+    are_equal: Vec<bool>,
+    /// Middle of the session, s. The delay is that in the middle.
+    middle_s: f64,
+}
+
+/// A number with its 95 % interval.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Estimate {
+    /// The number.
+    pub value: f64,
+    /// Its 95 % interval.
+    pub interval: [f64; 2],
+}
+
+/// What gain, offset and clock leave in one octave of frequency.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Octave {
+    /// The frequencies, such as `0.8 to 1.6 Hz`.
+    pub frequencies: String,
+    /// Root mean square, in multiples of the noise.
+    pub left: f64,
+    /// Its 95 % interval.
+    pub interval: [f64; 2],
+}
+
+/// How one column of the second recording differs from that of the first:
+/// `b(t) = gain a(t - delay_s - clock_rate (t - middle)) + offset`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Compared {
+    /// Column of the first recording.
+    pub a: String,
+    /// Column of the second recording.
+    pub b: String,
+    /// Unit of the second column; empty if unknown.
+    pub unit: String,
+    /// Factor, negative if the columns have opposite signs.
+    pub gain: Estimate,
+    /// Offset, in `unit`.
+    pub offset: Estimate,
+    /// Delay of the second recording in the middle of the common time, s; negative if it is early.
+    pub delay_s: Estimate,
+    /// Growth of the delay, s/s.
+    pub clock_rate: Estimate,
+    /// Units of the two columns that explain the gain.
+    pub units: Option<[&'static str; 2]>,
+    /// Correlation at the best lag.
+    pub correlation: f64,
+    /// Range of the second column, in `unit`.
+    pub range: f64,
+    /// Root mean square of the difference of the columns as recorded, on one clock, in `unit`.
+    pub difference: f64,
+    /// Root mean square that gain, offset, delay and clock leave, in `unit`.
+    pub left: f64,
+    /// Noise of the difference, one standard deviation in `unit`.
+    pub noise: f64,
+    /// What is left by octaves; empty for a short recording.
+    pub octaves: Vec<Octave>,
+    /// The numbers in a sentence.
+    pub sentence: String,
+}
+
+impl Pair {
+    /// Brings two recordings onto one clock: the time in which both were recorded, at the sample
+    /// times of the slower one. The recordings are shifted if this makes them much more alike.
+    ///
+    /// `columns` are the compared columns, each as `column` or `first=second`. If there are none,
+    /// all columns with the same name are compared, except those that are constant or not alike.
+    ///
+    /// # Errors
+    /// Columns that are missing, constant or not alike, and recordings without a common time.
+    pub fn new(a: &Trial, b: &Trial, columns: &[String]) -> Result<Self, ProblemError> {
+        let chosen = chosen(a, b, columns)?;
+        let (shift_s, base_s, mut notes) = aligned(a, b, &chosen)?;
+        let (trials, cut) = shortened(&[SessionTrial::new(merged(a, b, &chosen, shift_s))], 1)
+            .map(|(trials, cut)| (trials.into_owned(), cut))?;
+        notes.extend(cut);
+        let asked: Vec<&str> = trials[0].trial.channels.iter().map(|c| c.name.as_str()).collect();
+        let session = EvenSession::new(&trials, &asked, shortest(&trials))?;
+        notes.extend_from_slice(session.notes());
+        let dt_s = session.dt_s();
+        let longest = session.trials().iter().map(|t| t.columns()[0].len()).max().unwrap_or(0);
+        let margin = reach(dt_s, LATE.0).min(longest / 8);
+        let too_short = || {
+            let hint = "record both at the same time for 20 s or more";
+            let found =
+                format!("{} and {} have {:.3} s in common", a.name, b.name, longest as f64 * dt_s);
+            ProblemError::too_little(found, hint)
+        };
+        let kept: Vec<_> = session
+            .trials()
+            .iter()
+            .filter(|t| t.columns()[0].len() >= shortest(&trials) + 2 * margin)
+            .collect();
+        let last = kept.last().ok_or_else(too_short)?;
+        let middle_s = 0.5 * (last.start_s() + last.columns()[0].len() as f64 * dt_s);
+        let mut pair = Self {
+            names: [a.name.clone(), b.name.clone()],
+            columns: Vec::new(),
+            parts: vec![Vec::new(); kept.len()],
+            margin,
+            grid: Grid::samples(dt_s)?,
+            spec: ProblemSpec {
+                wrap: vec!["output.all".into()],
+                // the parameters delay and clock do the same
+                without: vec!["skew".into(), "clock_drift".into()],
+                ..ProblemSpec::default()
+            },
+            shift_s: shift_s - base_s,
+            correlations: Vec::new(),
+            are_equal: Vec::new(),
+            middle_s,
+        };
+        let mut channels: Vec<Vec<Channel>> = vec![Vec::new(); kept.len()];
+        for (at, names) in chosen.iter().enumerate() {
+            let turn = session.turns()[2 * at].zip(session.turns()[2 * at + 1]);
+            let column = |i: usize| kept.iter().map(move |t| t.columns()[2 * at + i].clone());
+            let (mut xs, ys): (Vec<_>, Vec<_>) = (column(0).collect(), column(1).collect());
+            for (x, y) in xs.iter_mut().zip(&ys) {
+                // Unwrapped angles begin at any turn.
+                let turns = turn.map_or(0.0, |(turn, _)| turn * ((y[0] - x[0]) / turn).round());
+                x.iter_mut().for_each(|x| *x += turns);
+            }
+            let (x, y) = (xs.concat(), ys.concat());
+            let likeness = Likeness::of(&x, &y, margin);
+            if likeness.r.abs() < ALIKE {
+                let of = format!("{} and {}", named(&a.name, &names[0]), named(&b.name, &names[1]));
+                let found =
+                    format!("{of} do not show the same motion (correlation {:.2})", likeness.r);
+                let hint =
+                    "compare recordings of one motion, or choose other columns with --signal A=B";
+                if !columns.is_empty() || chosen.len() == 1 {
+                    return Err(ProblemError::Refused(format!("{found}; {hint}")));
+                }
+                notes.push(format!("{found} and are left out"));
+                continue;
+            }
+            // An effect that smooths the noise of the first column would otherwise close a gap.
+            let noise = Noise::of_differences(xs.iter().map(Vec::as_slice), dt_s);
+            let smooth = |x: &Vec<f64>| Smoothed::of(x, noise.sd(), &unscheduled(x.len()));
+            let smooth =
+                MeasuredInput::new(xs.iter().map(smooth).collect(), noise.clone()).values();
+            let removed = x.iter().zip(&smooth).map(|(x, smooth)| (x - smooth).powi(2));
+            let removed = removed.sum::<f64>() / x.len() as f64;
+            let kept_noise = (noise.sd().powi(2) - removed).max(0.0).sqrt();
+            let line = likeness.line(&smooth, &y);
+            pair.are_equal.push(x == y);
+            let mut smooth = smooth.as_slice();
+            let one = chosen.len() == 1;
+            pair.spec.stages.push(line.stage(&names[1], &y, kept_noise, dt_s));
+            pair.spec.parameters.extend(line.parameters(&names[1], one, dt_s));
+            pair.columns.push(names.clone());
+            pair.correlations.push(likeness.r);
+            for (((part, own), x), y) in pair.parts.iter_mut().zip(&mut channels).zip(xs).zip(ys) {
+                let values = y[margin..y.len() - margin].to_vec();
+                own.push(Channel { name: names[1].clone(), values });
+                let (own, rest) = smooth.split_at(x.len());
+                part.push(own.to_vec());
+                smooth = rest;
+            }
+        }
+        if pair.columns.is_empty() {
+            let hint = "compare recordings of one motion, or choose columns with --signal A=B";
+            return Err(ProblemError::Refused(format!("{}; {hint}", listed(&notes))));
+        }
+        let trial = |(part, channels): (&&stretch_data::EvenTrial, Vec<Channel>)| {
+            let time_s = (0..channels[0].values.len()).map(|i| i as f64 * dt_s).collect();
+            let trial = Trial { name: part.name().to_owned(), time_s, channels };
+            SessionTrial {
+                start_s: part.start_s() + margin as f64 * dt_s,
+                ..SessionTrial::new(trial)
+            }
+        };
+        pair.spec.trials = kept.iter().zip(channels).map(trial).collect();
+        pair.spec.trials[0].notes = notes;
+        Ok(pair)
+    }
+
+    /// The second recording as a problem without its source.
+    pub fn spec(&self) -> &ProblemSpec {
+        &self.spec
+    }
+
+    /// The first recording as the source of the problem.
+    pub fn source(&self, session: &RecordedSession) -> Arc<dyn Source> {
+        let (pair, session) = (self.clone(), session.clone());
+        Arc::new(closure(move |ask: &Ask<'_>| {
+            let [gain, offset, delay_s, rate] =
+                std::array::from_fn(|i| ask.parameters[PARAMETERS.len() * ask.stage + i]);
+            let clock = ClockDrift::new(delay_s - rate * pair.middle_s, rate, &pair.grid);
+            let mut out = Vec::new();
+            for (part, to) in pair.parts.iter().zip(&session.trials[..ask.trials]) {
+                let mut signal = part[ask.stage].clone();
+                let start_s = to.start_s - pair.margin as f64 * pair.grid.dt_s();
+                let span = Span { start_s, ..Span::whole(&pair.grid) };
+                clock.run(&span, &mut [], &mut signal);
+                let kept = pair.margin..pair.margin + to.samples.len();
+                out.extend(signal[kept].iter().map(|x| gain * x + offset));
+            }
+            Ok(out)
+        }))
+    }
+
+    /// The problem that compares the recordings.
+    ///
+    /// # Errors
+    /// Those of [`Checked::new`].
+    pub fn problem(&self) -> Result<Problem, ProblemError> {
+        let checked = Checked::new(self.spec.clone())?;
+        let source = self.source(checked.session());
+        Ok(Problem::from(BlackBox::new(checked, source)).named(self.names.join(" and ")))
+    }
+
+    /// The numbers of a comparison, by column.
+    pub fn compared(&self, examined: &Examined) -> Vec<Compared> {
+        (0..self.columns.len()).map(|stage| self.compared_column(examined, stage)).collect()
+    }
+
+    fn compared_column(&self, examined: &Examined, stage: usize) -> Compared {
+        let diagnosis = &examined.diagnosis;
+        let [a, b] = self.columns[stage].clone();
+        let own = &self.spec.parameters[PARAMETERS.len() * stage..][..PARAMETERS.len()];
+        let shifts = own.iter().map(|p| diagnosis.parameters.iter().find(|s| s.name == p.name));
+        let shifts: Vec<Option<&ParameterShift>> = shifts.collect();
+        let estimate = |at: usize, by: f64| {
+            let (value, sd) = shifts[at].map_or((own[at].value, 0.0), |s| (s.fitted, s.sd));
+            let value = value + by;
+            Estimate { value, interval: [value - COVERS * sd, value + COVERS * sd] }
+        };
+        let evidence = &examined.evidence.stages[stage];
+        let trials = self.spec.trials.iter().map(|t| &t.trial.channels[stage].values);
+        let measured: Vec<f64> = trials.flatten().copied().collect();
+        let rms = |simulated: &[f64]| {
+            let squares = measured.iter().zip(simulated).map(|(m, s)| (m - s).powi(2));
+            (squares.sum::<f64>() / measured.len() as f64).sqrt()
+        };
+        let is_octave = |slice: &&SliceGap| {
+            slice.by == "frequency" && slice.stage == diagnosis.location.stages[stage].stage
+        };
+        let times = |excess: f64| (1.0 + excess).max(0.0).sqrt();
+        let octave = |slice: &SliceGap| Octave {
+            frequencies: slice.slice.clone(),
+            left: times(slice.excess),
+            interval: slice.excess_ci.map(times),
+        };
+        let gain = estimate(0, 0.0);
+        let (low, high) = ends(&measured);
+        let mut compared = Compared {
+            unit: unit_of(&b),
+            units: units_of_factor(gain.value, [&unit_of(&a), &unit_of(&b)]),
+            gain,
+            offset: estimate(1, 0.0),
+            delay_s: estimate(2, self.shift_s),
+            clock_rate: estimate(3, 0.0),
+            correlation: self.correlations[stage],
+            range: high - low,
+            difference: rms(&evidence.raw),
+            left: rms(&evidence.retuned),
+            noise: evidence.noise,
+            octaves: diagnosis.location.slices.iter().filter(is_octave).map(octave).collect(),
+            sentence: String::new(),
+            a,
+            b,
+        };
+        compared.sentence = match self.are_equal[stage] {
+            true => format!(
+                "{} equals {} in every sample.",
+                named(&self.names[1], &compared.b),
+                named(&self.names[0], &compared.a)
+            ),
+            false => compared.in_words([&self.names[0], &self.names[1]]),
+        };
+        compared
+    }
+}
+
+impl Compared {
+    /// Puts the significant differences into a sentence.
+    fn in_words(&self, [first, second]: [&str; 2]) -> String {
+        let (a, b) = (named(first, &self.a), named(second, &self.b));
+        let is_sure = |e: &Estimate, usual: f64| {
+            (e.value - usual).abs() * COVERS > SURE * (e.interval[1] - e.value)
+        };
+        let shown = |e: &Estimate, factor: f64, unit: &str| {
+            let [low, high] = e.interval.map(|x| factor * x);
+            let [value, low, high] = [factor * e.value, low, high].map(|x| in_digits(x, 4));
+            format!("{value}{unit} ({low} to {high})")
+        };
+        let mut parts = Vec::new();
+        if self.gain.value < 0.0 {
+            parts.push("is upside down".to_owned());
+        }
+        if let Some([from, to]) = self.units {
+            parts.push(format!("is in {to} instead of {from}"));
+        }
+        if is_sure(&self.gain, self.gain.value.signum()) {
+            parts.push(format!("is {} times as large", shown(&self.gain, 1.0, "")));
+        }
+        if is_sure(&self.offset, 0.0) {
+            parts.push(format!(
+                "is offset by {}",
+                shown(&self.offset, 1.0, &after_number(&self.unit))
+            ));
+        }
+        if is_sure(&self.delay_s, 0.0) {
+            let side = if self.delay_s.value > 0.0 { "late" } else { "early" };
+            let sign = self.delay_s.value.signum();
+            parts.push(format!("is {} {side}", shown(&self.delay_s, 1e3 * sign, " ms")));
+        }
+        if is_sure(&self.clock_rate, 0.0) {
+            let side = if self.clock_rate.value > 0.0 { "later" } else { "earlier" };
+            let sign = self.clock_rate.value.signum();
+            let rate = shown(&self.clock_rate, 1e3 * sign, " ms");
+            parts.push(format!("comes {rate} {side} with every second"));
+        }
+        let left = in_digits(self.left, 3) + &after_number(&self.unit);
+        let share = in_digits(100.0 * self.left / self.range, 2);
+        let left = format!("{left} rms remain, {share} % of the range");
+        match parts.is_empty() {
+            true => format!("{b} and {a} have the same gain, offset and clock; {left}."),
+            false => format!("Compared with {a}, {b} {}; {left}.", listed(&parts)),
+        }
+    }
+}
+
+/// The correlation of two columns at their best lag.
+#[derive(Debug, Clone, Copy, Default)]
+struct Likeness {
+    /// Samples by which the second column is late.
+    lag: f64,
+    /// Correlation at that lag; negative if one column is upside down.
+    r: f64,
+    at_zero: f64,
+}
+
+impl Likeness {
+    fn of(x: &[f64], y: &[f64], reach: usize) -> Self {
+        let reach = reach.min((x.len().max(3) - 3) / 2);
+        let signed = |sign: f64| {
+            let y: Vec<f64> = y.iter().map(|y| sign * y).collect();
+            // a constant column is like none
+            lag(x, &y, reach).map_or_else(
+                |_| Self::default(),
+                |l| Self { lag: l.samples, r: l.correlation, at_zero: l.correlation_at_zero },
+            )
+        };
+        let (up, down) = (signed(1.0), signed(-1.0));
+        // half a period of a periodic motion looks like the other sign
+        match 1.0 - down.r < BETTER * (1.0 - up.r) {
+            true => Self { r: -down.r, ..down },
+            false => up,
+        }
+    }
+
+    /// The line from the first to the second column at the best lag.
+    fn line(&self, x: &[f64], y: &[f64]) -> Line {
+        let lag = self.lag.round() as isize;
+        let (early, late) = ((-lag).max(0) as usize, lag.max(0) as usize);
+        let pairs = || x[early..].iter().zip(&y[late..]);
+        let n = pairs().count() as f64;
+        let mean = |of: &dyn Fn(f64, f64) -> f64| pairs().map(|(x, y)| of(*x, *y)).sum::<f64>() / n;
+        let (mx, my) = (mean(&|x, _| x), mean(&|_, y| y));
+        let (xx, xy) = (mean(&|x, _| (x - mx).powi(2)), mean(&|x, y| (x - mx) * (y - my)));
+        let gain = xy / xx.max(f64::MIN_POSITIVE);
+        let offset = my - gain * mx;
+        Line { gain, offset, left: pairs().map(|(x, y)| y - gain * x - offset).collect() }
+    }
+}
+
+/// A rough line through two columns, from which noise and tolerances are estimated.
+struct Line {
+    gain: f64,
+    offset: f64,
+    left: Vec<f64>,
+}
+
+impl Line {
+    fn stage(&self, column: &str, y: &[f64], kept_noise: f64, dt_s: f64) -> StageEntry {
+        let (low, high) = ends(y);
+        let noise = Noise::of_differences(std::iter::once(&self.left[..]), dt_s).sd();
+        let noise = noise.hypot(self.gain * kept_noise);
+        StageEntry {
+            name: column.into(),
+            output: column.into(),
+            noise: Some(noise.max(FLOOR * (high - low))),
+            ..StageEntry::default()
+        }
+    }
+
+    /// The parameters of a column. Their tolerances are so wide that they hardly matter.
+    fn parameters(&self, column: &str, is_alone: bool, dt_s: f64) -> [Parameter; 4] {
+        let unit = unit_of(column);
+        let (low, high) = ends(&self.left);
+        let values = [
+            (1.0, (self.gain - 1.0).abs().max(1.0), ""),
+            (0.0, self.offset.abs().max(high - low), unit.as_str()),
+            (0.0, reach(dt_s, LATE.0) as f64 * dt_s, "s"),
+            (0.0, CLOCK, "s/s"),
+        ];
+        std::array::from_fn(|i| {
+            let (value, sd, unit) = values[i];
+            let name = PARAMETERS[i];
+            Parameter {
+                name: if is_alone { name.into() } else { format!("{column}.{name}") },
+                unit: unit.into(),
+                value,
+                tolerance: Tolerance::Absolute(sd),
+                stages: vec![column.into()],
+                ..Parameter::default()
+            }
+        })
+    }
+}
+
+/// Number of samples of a time, at least those of [`LATE`].
+fn reach(dt_s: f64, time_s: f64) -> usize {
+    ((time_s / dt_s).round() as usize).max(LATE.1)
+}
+
+/// A column of a recording, in words.
+fn named(recording: &str, column: &str) -> String {
+    format!("{column} of {recording}")
+}
+
+/// The columns that are compared: those asked for, or all with the same name, or the only ones.
+fn chosen(a: &Trial, b: &Trial, asked: &[String]) -> Result<Vec<[String; 2]>, ProblemError> {
+    let names = |trial: &Trial| trial.channels.iter().map(|c| c.name.clone()).collect::<Vec<_>>();
+    let is_constant = |trial: &Trial, name: &str| {
+        trial.channel(name).is_some_and(|values| values.iter().all(|x| *x == values[0]))
+    };
+    let mut out = Vec::new();
+    for one in asked {
+        let (first, second) = one.split_once('=').unwrap_or((one, one));
+        let pair = [a.full_name(first).to_owned(), b.full_name(second).to_owned()];
+        a.require(&pair[0])?;
+        b.require(&pair[1])?;
+        out.push(pair);
+    }
+    let (own, other) = (names(a), names(b));
+    if asked.is_empty() {
+        let stem = |name: &str| {
+            unit(name).map_or(name, |unit| &name[..name.len() - unit.len()]).to_owned()
+        };
+        out.extend(own.iter().filter_map(|name| {
+            let same = other.iter().find(|o| *o == name).map(String::as_str);
+            let same = same.or_else(|| column_meant(&stem(name), other.iter().map(String::as_str)));
+            Some([name.clone(), same?.to_owned()])
+        }));
+        if let (true, [first], [second]) = (out.is_empty(), &own[..], &other[..]) {
+            out.push([first.clone(), second.clone()]);
+        }
+    }
+    let constant = |[first, second]: &[String; 2]| {
+        let first = is_constant(a, first).then(|| named(&a.name, first));
+        first.or_else(|| is_constant(b, second).then(|| named(&b.name, second)))
+    };
+    let dead = out.iter().find_map(constant);
+    if asked.is_empty() {
+        out.retain(|pair| constant(pair).is_none());
+    }
+    match dead.filter(|_| out.is_empty() || !asked.is_empty()) {
+        Some(dead) => Err(ProblemError::Refused(format!(
+            "{dead} is constant: there is no motion to compare; choose another column with --signal A=B"
+        ))),
+        None if out.is_empty() => Err(ProblemError::Refused(format!(
+            "{} and {} have no column with the same name: the first has {}, the second {}; choose with --signal A=B, as in --signal {}={}",
+            a.name,
+            b.name,
+            listed(&own),
+            listed(&other),
+            own.first().map_or("A", String::as_str),
+            other.first().map_or("B", String::as_str),
+        ))),
+        None => Ok(out),
+    }
+}
+
+/// Returns the time that is added to the clock of the first recording, the part of it that aligns
+/// starts because the clocks share no time, and notes on both.
+fn aligned(
+    a: &Trial,
+    b: &Trial,
+    columns: &[[String; 2]],
+) -> Result<(f64, f64, Vec<String>), ProblemError> {
+    for trial in [a, b] {
+        trial.check()?;
+    }
+    let shortest_s = a.duration_s().min(b.duration_s());
+    let common_s = |shift_s: f64| {
+        let span = |t: &Trial, by: f64| (t.time_s[0] + by, t.time_s[t.len() - 1] + by);
+        let ((a0, a1), (b0, b1)) = (span(a, shift_s), span(b, 0.0));
+        a1.min(b1) - a0.max(b0)
+    };
+    let starts_s = b.time_s[0] - a.time_s[0];
+    let mut notes = Vec::new();
+    let base_s = match common_s(0.0) > 0.0 {
+        true => 0.0,
+        false => {
+            notes.push(
+                "the clocks share no time; delays count from the start of each recording"
+                    .to_owned(),
+            );
+            starts_s
+        }
+    };
+    let look = |shift_s: f64, reach_s: f64| {
+        let both = merged(a, b, columns, shift_s);
+        let dt_s = both.duration_s() / (both.len().max(2) - 1) as f64;
+        let all = both.channels.chunks(2).map(|pair| {
+            Likeness::of(
+                &pair[0].values,
+                &pair[1].values,
+                reach(dt_s.max(f64::MIN_POSITIVE), reach_s),
+            )
+        });
+        let best = all.max_by(|x, y| x.r.abs().total_cmp(&y.r.abs())).unwrap_or_default();
+        (best, dt_s)
+    };
+    let dt_s = a.duration_s().max(b.duration_s()) / COARSE as f64;
+    let padded = |trial: &Trial, name: &str| {
+        let values = trial.channel(name).unwrap_or(&[]);
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let at = |i: usize| {
+            let t = trial.time_s[0] + i as f64 * dt_s;
+            interpolated((&trial.time_s, values), t, f64::INFINITY).unwrap_or(mean)
+        };
+        (0..2 * COARSE + 3).map(at).collect::<Vec<f64>>()
+    };
+    let over = columns.iter().map(|[x, y]| Likeness::of(&padded(a, x), &padded(b, y), COARSE));
+    let over = over.max_by(|x, y| x.r.abs().total_cmp(&y.r.abs())).unwrap_or_default();
+    let (given, given_dt_s) = look(base_s, LATE.0);
+    let far_s = starts_s + over.lag * dt_s;
+    let (far, far_dt_s) = look(far_s, LATE.0.max(2.0 * dt_s));
+    let is_far = |shift_s: f64| (shift_s - base_s - given.lag * given_dt_s).abs() > LATE.0;
+    let is_better = 1.0 - far.r.abs() < BETTER * (1.0 - given.r.abs());
+    let is_taken = is_far(far_s) && is_better && common_s(far_s) > 0.5 * shortest_s;
+    let (mut shift_s, best, dt_s) = match is_taken {
+        true => (far_s, far, far_dt_s),
+        false => (base_s, given, given_dt_s),
+    };
+    if best.at_zero.abs() < NEAR * best.r.abs() {
+        shift_s += best.lag * dt_s;
+    }
+    // whole samples, so that samples on the same grid stay as they are
+    shift_s = base_s + ((shift_s - base_s) / given_dt_s).round() * given_dt_s;
+    if shift_s != base_s {
+        let by_s = in_digits(shift_s - base_s, 4);
+        notes.push(format!(
+            "{} is {by_s} s later than {} by cross-correlation, and is shifted before the fit",
+            b.name, a.name
+        ));
+    }
+    Ok((shift_s, base_s, notes))
+}
+
+/// Both recordings at the sample times of the slower one, in the time in which both were recorded.
+/// The columns alternate; `shift_s` is added to the clock of the first recording.
+fn merged(a: &Trial, b: &Trial, columns: &[[String; 2]], shift_s: f64) -> Trial {
+    let step = |t: &Trial| 1.0 / t.rate_hz().unwrap_or(f64::INFINITY);
+    let is_a = step(a) > 1.01 * step(b);
+    let times: Vec<f64> = match is_a {
+        true => a.time_s.iter().map(|t| t + shift_s).collect(),
+        false => b.time_s.clone(),
+    };
+    let has = |trial: &Trial, t: f64| {
+        interpolated((&trial.time_s, &trial.time_s), t, BRIDGED * step(trial)).is_some()
+    };
+    let times: Vec<f64> = times.into_iter().filter(|t| has(a, t - shift_s) && has(b, *t)).collect();
+    let column = |trial: &Trial, name: &str, as_name: String, shift_s: f64| {
+        let values = trial.channel(name).unwrap_or(&[]);
+        let at = |t: &f64| interpolated((&trial.time_s, values), t - shift_s, f64::INFINITY);
+        Channel { name: as_name, values: times.iter().filter_map(at).collect() }
+    };
+    let both = |[x, y]: &[String; 2]| {
+        [column(a, x, format!("first {x}"), shift_s), column(b, y, y.clone(), 0.0)]
+    };
+    let channels = columns.iter().flat_map(both).collect();
+    let start_s = times.first().copied().unwrap_or(0.0);
+    let time_s = times.iter().map(|t| t - start_s).collect();
+    Trial { name: format!("{} and {}", a.name, b.name), time_s, channels }
+}
+
+/// Interpolates with a cubic through four samples, linearly next to an end; `None` outside the
+/// samples and in gaps longer than `longest_s`.
+fn interpolated((time_s, values): (&[f64], &[f64]), t: f64, longest_s: f64) -> Option<f64> {
+    // a time stamp that was shifted is equal but for rounding
+    let after = time_s.partition_point(|own| *own < t - 1e-9);
+    let (t1, x1) = (*time_s.get(after)?, *values.get(after)?);
+    if (t1 - t).abs() <= 1e-9 {
+        return Some(x1);
+    }
+    let before = after.checked_sub(1)?;
+    let nodes = match before > 0 && after + 1 < time_s.len() {
+        true => before - 1..after + 2,
+        false => before..after + 1,
+    };
+    let weight = |i: usize| {
+        let others = nodes.clone().filter(|j| *j != i);
+        others.map(|j| (t - time_s[j]) / (time_s[i] - time_s[j])).product::<f64>()
+    };
+    let value = nodes.clone().map(|i| values[i] * weight(i)).sum();
+    (t1 - time_s[before] <= longest_s).then_some(value)
+}

@@ -282,7 +282,8 @@ fn options(command: &clap::Command) -> usize {
 }
 
 /// A command's help must be short, and the numbers of commands and options must remain small. The
-/// fifteenth command is `compare`: it needs no simulator and no calibration, only two recordings.
+/// fifteenth command is `compare`, which needs no simulator and no calibration, only two recordings.
+/// Its four options have the names and meanings of those of other commands.
 #[test]
 fn commands_and_options_are_few_and_a_short_help_fits_a_screen() {
     let program = stretch_cli::command();
@@ -291,7 +292,7 @@ fn commands_and_options_are_few_and_a_short_help_fits_a_screen() {
     let counts: Vec<_> = commands.iter().map(|c| (c.get_name(), options(c))).collect();
     let count: usize = counts.iter().map(|(_, count)| count).sum();
     assert!(
-        counts.len() <= 15 && count <= 90,
+        counts.len() <= 15 && count <= 94,
         "{} commands, {count} options: {counts:?}",
         counts.len()
     );

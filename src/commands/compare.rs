@@ -6,12 +6,13 @@ use anyhow::Context;
 use stretch_data::files::Outputs;
 use stretch_gap::Options;
 use stretch_problem::{Compared, Pair};
+use stretch_recording::TimeColumn;
 use stretch_report::{Subject, diagnosis_page, times};
 
 use super::{
     diagnose::{print, told_on},
     json::Json,
-    reading::{Recorded, read_recording},
+    reading::read_recording,
     shared::{say, say_first, spinner, stage_text, tell},
 };
 use crate::{
@@ -45,8 +46,9 @@ pub(crate) struct Args {
     /// Column to compare, or A=B; several are separated by commas [default: all with the same name]
     #[arg(long, value_name = "A=B", value_delimiter = ',')]
     signal: Vec<String>,
-    #[command(flatten)]
-    recorded: Recorded,
+    /// Time column of both; COL:ms if in ms; 100hz if there is none
+    #[arg(long, value_name = "COL", default_value = "time_s")]
+    time: TimeColumn,
     #[command(flatten)]
     json: Json,
     /// Write a report that opens in any browser
@@ -57,7 +59,7 @@ pub(crate) struct Args {
 pub(crate) fn run(args: Args) -> anyhow::Result<()> {
     args.json.share_stdout([args.report.as_deref()])?;
     let bar = spinner();
-    let options = args.recorded.options();
+    let options = args.time.options();
     let [a, b] = [&args.first, &args.second].map(|path| read_recording(path, &options));
     let pair = Pair::new(&a?, &b?, &args.signal)?;
     let problem = pair.problem()?;
@@ -77,11 +79,17 @@ pub(crate) fn run(args: Args) -> anyhow::Result<()> {
         compared.iter().try_for_each(|one| say_first(&one.sentence))?;
         if !is_quiet() {
             compared.iter().try_for_each(|one| say(numbers(one)))?;
+            say(ROLES)?;
             print(&examined)?;
         }
         args.report.iter().try_for_each(|path| tell(format!("wrote {}", path.display())))
     })
 }
+
+/// What the words of a diagnosis mean here.
+const ROLES: &str = "
+In the diagnosis, the simulator is the first recording with this gain, offset and clock; the rig is the second.
+";
 
 /// The numbers of one column, and what is left by octaves.
 fn numbers(one: &Compared) -> String {
@@ -104,5 +112,5 @@ fn numbers(one: &Compared) -> String {
         });
         out += &format!("\n\n{}", table(&["Octave", "Left, x noise", "95 % interval"], rows));
     }
-    out + "\n\nIn the diagnosis, the simulator is the first recording with this gain, offset and clock; the rig is the second.\n"
+    out
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use serde::Serialize;
 use stretch_data::{
-    Channel, EvenSession, SessionTrial, Trial, after_number, column_meant, ends, in_digits, listed,
-    unit, unit_of,
+    Channel, EvenSession, EvenTrial, SessionTrial, Trial, after_number, column_meant, ends,
+    in_digits, listed, unit, unit_of,
 };
 use stretch_effects::{ClockDrift, Grid, Operator, Span};
 use stretch_gap::{Noise, ParameterShift, SliceGap, units_of_factor};
@@ -32,13 +32,16 @@ use crate::{
 const LATE: (f64, usize) = (0.2, 20);
 /// Tolerance of the clock rate, s/s: good recorders differ by 1e-4, time stamps of a rounded rate by more.
 const CLOCK: f64 = 1e-3;
+/// Least number of common samples.
+const LEAST: usize = 200;
 /// Least correlation of two recordings of one motion.
 const ALIKE: f64 = 0.5;
 /// An alignment is preferred only if it reduces the unexplained part (1 - correlation) to this share.
 const BETTER: f64 = 0.5;
 /// Share of the correlation at the best lag below which the recordings are shifted before the fit.
 const NEAR: f64 = 0.9;
-/// Greatest number of samples of the cross-correlation over whole recordings.
+/// Number of samples of the shorter recording in the cross-correlation of whole recordings. Lags up
+/// to half of it are tried.
 const COARSE: usize = 2000;
 /// Smallest noise, as a share of the range: interpolation between samples is no more accurate.
 const FLOOR: f64 = 1e-4;
@@ -161,29 +164,29 @@ impl Pair {
     /// Columns that are missing, constant or not alike, and recordings without a common time.
     pub fn new(a: &Trial, b: &Trial, columns: &[String]) -> Result<Self, ProblemError> {
         let chosen = chosen(a, b, columns)?;
-        let (shift_s, base_s, mut notes) = aligned(a, b, &chosen)?;
-        let (trials, cut) = shortened(&[SessionTrial::new(merged(a, b, &chosen, shift_s))], 1)
-            .map(|(trials, cut)| (trials.into_owned(), cut))?;
+        let (shift_s, mut notes) = aligned(a, b, &chosen)?;
+        let base_s = base_s(a, b);
+        let both = [SessionTrial::new(merged(a, b, &chosen, base_s + shift_s))];
+        let (trials, cut) = shortened(&both, chosen.len())?;
         notes.extend(cut);
         let asked: Vec<&str> = trials[0].trial.channels.iter().map(|c| c.name.as_str()).collect();
         let session = EvenSession::new(&trials, &asked, shortest(&trials))?;
         notes.extend_from_slice(session.notes());
         let dt_s = session.dt_s();
-        let longest = session.trials().iter().map(|t| t.columns()[0].len()).max().unwrap_or(0);
+        let samples = |t: &EvenTrial| t.columns()[0].len();
+        let longest = session.trials().iter().map(samples).max().unwrap_or(0);
         let margin = reach(dt_s, LATE.0).min(longest / 8);
-        let too_short = || {
-            let hint = "record both at the same time for 20 s or more";
-            let found =
-                format!("{} and {} have {:.3} s in common", a.name, b.name, longest as f64 * dt_s);
-            ProblemError::too_little(found, hint)
+        let is_long = |t: &&EvenTrial| samples(t) >= shortest(&trials) + 2 * margin;
+        let kept: Vec<&EvenTrial> = session.trials().iter().filter(is_long).collect();
+        let is_enough = kept.iter().map(|t| samples(t)).sum::<usize>() >= LEAST;
+        let last = kept.last().filter(|_| is_enough);
+        let last = last.ok_or_else(|| too_short(a, b, longest as f64 * dt_s))?;
+        let trial = |part: &&EvenTrial| {
+            let time_s = (0..samples(part) - 2 * margin).map(|i| i as f64 * dt_s).collect();
+            let trial = Trial { name: part.name().to_owned(), time_s, channels: Vec::new() };
+            let start_s = part.start_s() + margin as f64 * dt_s;
+            SessionTrial { start_s, ..SessionTrial::new(trial) }
         };
-        let kept: Vec<_> = session
-            .trials()
-            .iter()
-            .filter(|t| t.columns()[0].len() >= shortest(&trials) + 2 * margin)
-            .collect();
-        let last = kept.last().ok_or_else(too_short)?;
-        let middle_s = 0.5 * (last.start_s() + last.columns()[0].len() as f64 * dt_s);
         let mut pair = Self {
             names: [a.name.clone(), b.name.clone()],
             columns: Vec::new(),
@@ -194,76 +197,71 @@ impl Pair {
                 wrap: vec!["output.all".into()],
                 // the parameters delay and clock do the same
                 without: vec!["skew".into(), "clock_drift".into()],
+                trials: kept.iter().map(trial).collect(),
                 ..ProblemSpec::default()
             },
-            shift_s: shift_s - base_s,
+            shift_s,
             correlations: Vec::new(),
             are_equal: Vec::new(),
-            middle_s,
+            middle_s: 0.5 * (last.start_s() + samples(last) as f64 * dt_s),
         };
-        let mut channels: Vec<Vec<Channel>> = vec![Vec::new(); kept.len()];
+        let mut unlike = Vec::new();
         for (at, names) in chosen.iter().enumerate() {
             let turn = session.turns()[2 * at].zip(session.turns()[2 * at + 1]);
-            let column = |i: usize| kept.iter().map(move |t| t.columns()[2 * at + i].clone());
-            let (mut xs, ys): (Vec<_>, Vec<_>) = (column(0).collect(), column(1).collect());
+            let [mut xs, ys] = [0, 1]
+                .map(|i| kept.iter().map(|t| t.columns()[2 * at + i].clone()).collect::<Vec<_>>());
             for (x, y) in xs.iter_mut().zip(&ys) {
-                // Unwrapped angles begin at any turn.
+                // unwrapped angles begin at any turn
                 let turns = turn.map_or(0.0, |(turn, _)| turn * ((y[0] - x[0]) / turn).round());
                 x.iter_mut().for_each(|x| *x += turns);
             }
-            let (x, y) = (xs.concat(), ys.concat());
-            let likeness = Likeness::of(&x, &y, margin);
-            if likeness.r.abs() < ALIKE {
-                let of = format!("{} and {}", named(&a.name, &names[0]), named(&b.name, &names[1]));
-                let found =
-                    format!("{of} do not show the same motion (correlation {:.2})", likeness.r);
-                let hint =
-                    "compare recordings of one motion, or choose other columns with --signal A=B";
-                if !columns.is_empty() || chosen.len() == 1 {
-                    return Err(ProblemError::Refused(format!("{found}; {hint}")));
-                }
-                notes.push(format!("{found} and are left out"));
-                continue;
-            }
-            // An effect that smooths the noise of the first column would otherwise close a gap.
-            let noise = Noise::of_differences(xs.iter().map(Vec::as_slice), dt_s);
-            let smooth = |x: &Vec<f64>| Smoothed::of(x, noise.sd(), &unscheduled(x.len()));
-            let smooth =
-                MeasuredInput::new(xs.iter().map(smooth).collect(), noise.clone()).values();
-            let removed = x.iter().zip(&smooth).map(|(x, smooth)| (x - smooth).powi(2));
-            let removed = removed.sum::<f64>() / x.len() as f64;
-            let kept_noise = (noise.sd().powi(2) - removed).max(0.0).sqrt();
-            let line = likeness.line(&smooth, &y);
-            pair.are_equal.push(x == y);
-            let mut smooth = smooth.as_slice();
-            let one = chosen.len() == 1;
-            pair.spec.stages.push(line.stage(&names[1], &y, kept_noise, dt_s));
-            pair.spec.parameters.extend(line.parameters(&names[1], one, dt_s));
-            pair.columns.push(names.clone());
-            pair.correlations.push(likeness.r);
-            for (((part, own), x), y) in pair.parts.iter_mut().zip(&mut channels).zip(xs).zip(ys) {
-                let values = y[margin..y.len() - margin].to_vec();
-                own.push(Channel { name: names[1].clone(), values });
-                let (own, rest) = smooth.split_at(x.len());
-                part.push(own.to_vec());
-                smooth = rest;
-            }
+            unlike.extend(pair.add(names, chosen.len() == 1, &xs, &ys).err());
         }
-        if pair.columns.is_empty() {
-            let hint = "compare recordings of one motion, or choose columns with --signal A=B";
-            return Err(ProblemError::Refused(format!("{}; {hint}", listed(&notes))));
+        if pair.columns.is_empty() || (!columns.is_empty() && !unlike.is_empty()) {
+            let hint =
+                "compare recordings of one motion, or choose other columns with --signal A=B";
+            return Err(ProblemError::Refused(format!("{}; {hint}", listed(&unlike))));
         }
-        let trial = |(part, channels): (&&stretch_data::EvenTrial, Vec<Channel>)| {
-            let time_s = (0..channels[0].values.len()).map(|i| i as f64 * dt_s).collect();
-            let trial = Trial { name: part.name().to_owned(), time_s, channels };
-            SessionTrial {
-                start_s: part.start_s() + margin as f64 * dt_s,
-                ..SessionTrial::new(trial)
-            }
-        };
-        pair.spec.trials = kept.iter().zip(channels).map(trial).collect();
+        notes.extend(unlike.into_iter().map(|unlike| format!("{unlike}; they are left out")));
         pair.spec.trials[0].notes = notes;
         Ok(pair)
+    }
+
+    /// Adds a column, given by parts, unless the recordings show no common motion.
+    fn add(
+        &mut self,
+        names: &[String; 2],
+        is_alone: bool,
+        xs: &[Vec<f64>],
+        ys: &[Vec<f64>],
+    ) -> Result<(), String> {
+        let (x, y, dt_s) = (xs.concat(), ys.concat(), self.grid.dt_s());
+        let likeness = Likeness::of(&x, &y, self.margin);
+        if likeness.r.abs() < ALIKE {
+            let [a, b] = [0, 1].map(|i| named(&self.names[i], &names[i]));
+            let r = likeness.r;
+            return Err(format!("{a} and {b} do not show the same motion (correlation {r:.2})"));
+        }
+        // Otherwise, an effect that smooths the noise of the first column would close a gap.
+        let noise = Noise::of_differences(xs.iter().map(Vec::as_slice), dt_s);
+        let smooth = |x: &Vec<f64>| Smoothed::of(x, noise.sd(), &unscheduled(x.len()));
+        let smooth = MeasuredInput::new(xs.iter().map(smooth).collect(), noise.clone());
+        let values = smooth.values();
+        let removed = x.iter().zip(&values).map(|(x, smooth)| (x - smooth).powi(2)).sum::<f64>();
+        let kept = (noise.sd().powi(2) - removed / x.len() as f64).max(0.0).sqrt();
+        let line = likeness.line(&values, &y);
+        self.spec.stages.push(line.stage(&names[1], &y, kept, dt_s));
+        self.spec.parameters.extend(line.parameters(&names[1], is_alone, dt_s));
+        self.columns.push(names.clone());
+        self.correlations.push(likeness.r);
+        self.are_equal.push(x == y);
+        for (at, y) in ys.iter().enumerate() {
+            self.parts[at].push(smooth.trial(at, None));
+            let values = y[self.margin..y.len() - self.margin].to_vec();
+            let channel = Channel { name: names[1].clone(), values };
+            self.spec.trials[at].trial.channels.push(channel);
+        }
+        Ok(())
     }
 
     /// The second recording as a problem without its source.
@@ -372,8 +370,9 @@ impl Compared {
             (e.value - usual).abs() * COVERS > SURE * (e.interval[1] - e.value)
         };
         let shown = |e: &Estimate, factor: f64, unit: &str| {
-            let [low, high] = e.interval.map(|x| factor * x);
-            let [value, low, high] = [factor * e.value, low, high].map(|x| in_digits(x, 4));
+            let mut all = [e.interval[0], e.value, e.interval[1]].map(|x| factor * x);
+            all.sort_by(f64::total_cmp);
+            let [low, value, high] = all.map(|x| in_digits(x, 4));
             format!("{value}{unit} ({low} to {high})")
         };
         let mut parts = Vec::new();
@@ -436,10 +435,16 @@ impl Likeness {
         };
         let (up, down) = (signed(1.0), signed(-1.0));
         // half a period of a periodic motion looks like the other sign
-        match 1.0 - down.r < BETTER * (1.0 - up.r) {
+        match up.r < NEAR * down.r {
             true => Self { r: -down.r, ..down },
             false => up,
         }
+    }
+
+    /// The likeness of the columns that are most alike.
+    fn best(pairs: impl Iterator<Item = [Vec<f64>; 2]>, reach: usize) -> Self {
+        let all = pairs.map(|[x, y]| Self::of(&x, &y, reach));
+        all.max_by(|x, y| x.r.abs().total_cmp(&y.r.abs())).unwrap_or_default()
     }
 
     /// The line from the first to the second column at the best lag.
@@ -565,95 +570,90 @@ fn chosen(a: &Trial, b: &Trial, asked: &[String]) -> Result<Vec<[String; 2]>, Pr
     }
 }
 
-/// Returns the time that is added to the clock of the first recording, the part of it that aligns
-/// starts because the clocks share no time, and notes on both.
+fn too_short(a: &Trial, b: &Trial, common_s: f64) -> ProblemError {
+    let found = format!("{} and {} have {common_s:.3} s in common", a.name, b.name);
+    ProblemError::too_little(found, "record both at the same time for 20 s or more")
+}
+
+/// Sample time, s; infinite for a single sample.
+fn step_s(trial: &Trial) -> f64 {
+    1.0 / trial.rate_hz().unwrap_or(0.0)
+}
+
+/// Time in which both were recorded, if `shift_s` is added to the clock of the first, s.
+fn common_s(a: &Trial, b: &Trial, shift_s: f64) -> f64 {
+    let end = |t: &Trial| t.time_s[t.len() - 1];
+    (end(a) + shift_s).min(end(b)) - (a.time_s[0] + shift_s).max(b.time_s[0])
+}
+
+/// Time that aligns the starts of two recordings whose clocks share no time, s; otherwise 0.
+fn base_s(a: &Trial, b: &Trial) -> f64 {
+    if common_s(a, b, 0.0) > 0.0 { 0.0 } else { b.time_s[0] - a.time_s[0] }
+}
+
+/// Returns the time in which the first recording is shifted in addition to [`base_s`], and notes.
 fn aligned(
     a: &Trial,
     b: &Trial,
     columns: &[[String; 2]],
-) -> Result<(f64, f64, Vec<String>), ProblemError> {
-    for trial in [a, b] {
-        trial.check()?;
+) -> Result<(f64, Vec<String>), ProblemError> {
+    a.check()?;
+    b.check()?;
+    let (base_s, dt_s) = (base_s(a, b), step_s(a).max(step_s(b)));
+    if !dt_s.is_finite() {
+        return Err(too_short(a, b, 0.0));
     }
-    let shortest_s = a.duration_s().min(b.duration_s());
-    let common_s = |shift_s: f64| {
-        let span = |t: &Trial, by: f64| (t.time_s[0] + by, t.time_s[t.len() - 1] + by);
-        let ((a0, a1), (b0, b1)) = (span(a, shift_s), span(b, 0.0));
-        a1.min(b1) - a0.max(b0)
-    };
-    let starts_s = b.time_s[0] - a.time_s[0];
     let mut notes = Vec::new();
-    let base_s = match common_s(0.0) > 0.0 {
-        true => 0.0,
-        false => {
-            notes.push(
-                "the clocks share no time; delays count from the start of each recording"
-                    .to_owned(),
-            );
-            starts_s
-        }
-    };
+    if base_s != 0.0 {
+        notes
+            .push("the clocks share no time; delays count from the start of each recording".into());
+    }
     let look = |shift_s: f64, reach_s: f64| {
         let both = merged(a, b, columns, shift_s);
-        let dt_s = both.duration_s() / (both.len().max(2) - 1) as f64;
-        let all = both.channels.chunks(2).map(|pair| {
-            Likeness::of(
-                &pair[0].values,
-                &pair[1].values,
-                reach(dt_s.max(f64::MIN_POSITIVE), reach_s),
-            )
-        });
-        let best = all.max_by(|x, y| x.r.abs().total_cmp(&y.r.abs())).unwrap_or_default();
-        (best, dt_s)
+        let pairs = both.channels.chunks(2).map(|c| [c[0].values.clone(), c[1].values.clone()]);
+        Likeness::best(pairs, reach(dt_s, reach_s))
     };
-    let dt_s = a.duration_s().max(b.duration_s()) / COARSE as f64;
-    let padded = |trial: &Trial, name: &str| {
+    let coarse_s = a.duration_s().min(b.duration_s()) / COARSE as f64;
+    let thinned = |trial: &Trial, name: &str| {
         let values = trial.channel(name).unwrap_or(&[]);
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        let at = |i: usize| {
-            let t = trial.time_s[0] + i as f64 * dt_s;
-            interpolated((&trial.time_s, values), t, f64::INFINITY).unwrap_or(mean)
-        };
-        (0..2 * COARSE + 3).map(at).collect::<Vec<f64>>()
+        let time_s = |i: usize| trial.time_s[0] + i as f64 * coarse_s;
+        let at = |i| interpolated((&trial.time_s, values), time_s(i), f64::INFINITY);
+        (0..COARSE).map_while(at).collect::<Vec<f64>>()
     };
-    let over = columns.iter().map(|[x, y]| Likeness::of(&padded(a, x), &padded(b, y), COARSE));
-    let over = over.max_by(|x, y| x.r.abs().total_cmp(&y.r.abs())).unwrap_or_default();
-    let (given, given_dt_s) = look(base_s, LATE.0);
-    let far_s = starts_s + over.lag * dt_s;
-    let (far, far_dt_s) = look(far_s, LATE.0.max(2.0 * dt_s));
-    let is_far = |shift_s: f64| (shift_s - base_s - given.lag * given_dt_s).abs() > LATE.0;
+    let pairs = columns.iter().map(|[x, y]| [thinned(a, x), thinned(b, y)]);
+    let far_s = b.time_s[0] - a.time_s[0] + Likeness::best(pairs, COARSE / 2).lag * coarse_s;
+    let given = look(base_s, LATE.0);
+    let far = look(far_s, LATE.0.max(2.0 * coarse_s));
+    let is_far = (far_s - base_s - given.lag * dt_s).abs() > LATE.0;
     let is_better = 1.0 - far.r.abs() < BETTER * (1.0 - given.r.abs());
-    let is_taken = is_far(far_s) && is_better && common_s(far_s) > 0.5 * shortest_s;
-    let (mut shift_s, best, dt_s) = match is_taken {
-        true => (far_s, far, far_dt_s),
-        false => (base_s, given, given_dt_s),
+    let is_long = common_s(a, b, far_s) > 0.5 * a.duration_s().min(b.duration_s());
+    let (mut shift_s, best) = match is_far && is_better && is_long {
+        true => (far_s - base_s, far),
+        false => (0.0, given),
     };
     if best.at_zero.abs() < NEAR * best.r.abs() {
         shift_s += best.lag * dt_s;
     }
     // whole samples, so that samples on the same grid stay as they are
-    shift_s = base_s + ((shift_s - base_s) / given_dt_s).round() * given_dt_s;
-    if shift_s != base_s {
-        let by_s = in_digits(shift_s - base_s, 4);
+    shift_s = (shift_s / dt_s).round() * dt_s;
+    if shift_s != 0.0 {
+        let (by_s, a, b) = (in_digits(shift_s, 4), &a.name, &b.name);
         notes.push(format!(
-            "{} is {by_s} s later than {} by cross-correlation, and is shifted before the fit",
-            b.name, a.name
+            "{b} is {by_s} s later than {a} by cross-correlation, and is shifted before the fit"
         ));
     }
-    Ok((shift_s, base_s, notes))
+    Ok((shift_s, notes))
 }
 
 /// Both recordings at the sample times of the slower one, in the time in which both were recorded.
 /// The columns alternate; `shift_s` is added to the clock of the first recording.
 fn merged(a: &Trial, b: &Trial, columns: &[[String; 2]], shift_s: f64) -> Trial {
-    let step = |t: &Trial| 1.0 / t.rate_hz().unwrap_or(f64::INFINITY);
-    let is_a = step(a) > 1.01 * step(b);
-    let times: Vec<f64> = match is_a {
+    let times: Vec<f64> = match step_s(a) > 1.01 * step_s(b) {
         true => a.time_s.iter().map(|t| t + shift_s).collect(),
         false => b.time_s.clone(),
     };
     let has = |trial: &Trial, t: f64| {
-        interpolated((&trial.time_s, &trial.time_s), t, BRIDGED * step(trial)).is_some()
+        interpolated((&trial.time_s, &trial.time_s), t, BRIDGED * step_s(trial)).is_some()
     };
     let times: Vec<f64> = times.into_iter().filter(|t| has(a, t - shift_s) && has(b, *t)).collect();
     let column = |trial: &Trial, name: &str, as_name: String, shift_s: f64| {

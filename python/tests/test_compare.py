@@ -41,7 +41,9 @@ def test_columns_are_chosen_by_signal(tmp_path):
     other = log(np.deg2rad(knee(slow)), 1, slow, "angle")
     path = tmp_path / "b.csv"
     np.savetxt(path, np.c_[slow, other["angle"]], delimiter=",", header="time_s,angle", comments="")
-    assert stretch_gap.compare(A, path, signal="knee_deg=angle").compared[0]["gain"]["value"] == pytest.approx(np.pi / 180, rel=0.01)
+    assert stretch_gap.compare(A, path, signal="knee_deg=angle").compared[0]["gain"]["value"] == pytest.approx(
+        np.pi / 180, rel=0.01
+    )
 
 
 def test_what_cannot_be_compared_is_refused():

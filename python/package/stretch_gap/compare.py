@@ -81,7 +81,8 @@ def compare(
         columns = [column for column in trials[0].columns if column not in entries.CLOCKS]
         recording, *_ = entries.recorded(trials, rate_hz, columns)[0]
         both.append({**recording, "name": trials[0].name or name})
-    checked = _stretch.Problem.compared(*both, entries.texts("signal", signal))
+    first, second = both
+    checked = _stretch.Problem.compared(first, second, entries.texts("signal", signal))
     how = {
         "name": " and ".join(one["name"] for one in both),
         "depth": entries.whole("depth", depth, 1),

@@ -78,7 +78,7 @@ pub(crate) struct Chosen<'a> {
 }
 
 /// Standard deviations to either side that hold 95 % of a Gaussian.
-const COVERS: f64 = 1.96;
+pub(crate) const COVERS: f64 = 1.96;
 /// Smallest tolerance as a share of the value, because a parameter without a tolerance would count as
 /// exact.
 const LEAST: f64 = 1e-6;

@@ -1,16 +1,16 @@
 //! Compares two recordings of the same quantity. The first recording plays the simulator of the
 //! second one, with a gain, an offset, a delay and a clock rate as its parameters.
 
+mod alignment;
+mod numbers;
+
 use std::sync::Arc;
 
-use serde::Serialize;
 use stretch_data::{
-    Channel, EvenSession, EvenTrial, SessionTrial, Trial, after_number, column_meant, ends,
-    in_digits, listed, unit, unit_of,
+    Channel, EvenSession, EvenTrial, SessionTrial, Trial, column_meant, ends, listed, unit, unit_of,
 };
 use stretch_effects::{ClockDrift, Grid, Operator, Span};
 use stretch_gap::{Noise, ParameterShift, SliceGap, units_of_factor};
-use stretch_metrics::lag;
 use stretch_sim::Tolerance;
 
 use crate::{
@@ -25,32 +25,20 @@ use crate::{
     },
     error::ProblemError,
     examine::Examined,
+    fix::COVERS,
     problem::Problem,
 };
+use alignment::{LATE, Likeness, aligned, base_s, merged, reach, too_short};
+pub use numbers::{Compared, Estimate, Octave};
 
-/// Longest delay that the fit of the clock reaches without a shift of the recordings, s, and in samples.
-const LATE: (f64, usize) = (0.2, 20);
 /// Tolerance of the clock rate, s/s: good recorders differ by 1e-4, time stamps of a rounded rate by more.
 const CLOCK: f64 = 1e-3;
 /// Least number of common samples.
 const LEAST: usize = 200;
 /// Least correlation of two recordings of one motion.
 const ALIKE: f64 = 0.5;
-/// An alignment is preferred only if it reduces the unexplained part (1 - correlation) to this share.
-const BETTER: f64 = 0.5;
-/// Share of the correlation at the best lag below which the recordings are shifted before the fit.
-const NEAR: f64 = 0.9;
-/// Number of samples of the shorter recording in the cross-correlation of whole recordings. Lags up
-/// to half of it are tried.
-const COARSE: usize = 2000;
 /// Smallest noise, as a share of the range: interpolation between samples is no more accurate.
 const FLOOR: f64 = 1e-4;
-/// Longest time between two samples over which a recording is interpolated, in sample times.
-const BRIDGED: f64 = 4.5;
-/// Number of standard deviations from which a difference is put into the sentence.
-const SURE: f64 = 3.0;
-/// Number of standard deviations on either side of the mean within which 95 % of a Gaussian lie.
-const COVERS: f64 = 1.96;
 /// Parameters of each compared column.
 const PARAMETERS: [&str; 4] = ["gain", "offset", "delay", "clock"];
 
@@ -95,62 +83,6 @@ pub struct Pair {
     are_equal: Vec<bool>,
     /// Middle of the session, s. The delay is that in the middle.
     middle_s: f64,
-}
-
-/// A number with its 95 % interval.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Estimate {
-    /// The number.
-    pub value: f64,
-    /// Its 95 % interval.
-    pub interval: [f64; 2],
-}
-
-/// What gain, offset and clock leave in one octave of frequency.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Octave {
-    /// The frequencies, such as `0.8 to 1.6 Hz`.
-    pub frequencies: String,
-    /// Root mean square, in multiples of the noise.
-    pub left: f64,
-    /// Its 95 % interval.
-    pub interval: [f64; 2],
-}
-
-/// How one column of the second recording differs from that of the first:
-/// `b(t) = gain a(t - delay_s - clock_rate (t - middle)) + offset`.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Compared {
-    /// Column of the first recording.
-    pub a: String,
-    /// Column of the second recording.
-    pub b: String,
-    /// Unit of the second column; empty if unknown.
-    pub unit: String,
-    /// Factor, negative if the columns have opposite signs.
-    pub gain: Estimate,
-    /// Offset, in `unit`.
-    pub offset: Estimate,
-    /// Delay of the second recording in the middle of the common time, s; negative if it is early.
-    pub delay_s: Estimate,
-    /// Growth of the delay, s/s.
-    pub clock_rate: Estimate,
-    /// Units of the two columns that explain the gain.
-    pub units: Option<[&'static str; 2]>,
-    /// Correlation at the best lag.
-    pub correlation: f64,
-    /// Range of the second column, in `unit`.
-    pub range: f64,
-    /// Root mean square of the difference of the columns as recorded, on one clock, in `unit`.
-    pub difference: f64,
-    /// Root mean square that gain, offset, delay and clock leave, in `unit`.
-    pub left: f64,
-    /// Noise of the difference, one standard deviation in `unit`.
-    pub noise: f64,
-    /// What is left by octaves; empty for a short recording.
-    pub octaves: Vec<Octave>,
-    /// The numbers in a sentence.
-    pub sentence: String,
 }
 
 impl Pair {
@@ -362,106 +294,6 @@ impl Pair {
     }
 }
 
-impl Compared {
-    /// Puts the significant differences into a sentence.
-    fn in_words(&self, [first, second]: [&str; 2]) -> String {
-        let (a, b) = (named(first, &self.a), named(second, &self.b));
-        let is_sure = |e: &Estimate, usual: f64| {
-            (e.value - usual).abs() * COVERS > SURE * (e.interval[1] - e.value)
-        };
-        let shown = |e: &Estimate, factor: f64, unit: &str| {
-            let mut all = [e.interval[0], e.value, e.interval[1]].map(|x| factor * x);
-            all.sort_by(f64::total_cmp);
-            let [low, value, high] = all.map(|x| in_digits(x, 4));
-            format!("{value}{unit} ({low} to {high})")
-        };
-        let mut parts = Vec::new();
-        if self.gain.value < 0.0 {
-            parts.push("is upside down".to_owned());
-        }
-        if let Some([from, to]) = self.units {
-            parts.push(format!("is in {to} instead of {from}"));
-        }
-        if is_sure(&self.gain, self.gain.value.signum()) {
-            parts.push(format!("is {} times as large", shown(&self.gain, 1.0, "")));
-        }
-        if is_sure(&self.offset, 0.0) {
-            parts.push(format!(
-                "is offset by {}",
-                shown(&self.offset, 1.0, &after_number(&self.unit))
-            ));
-        }
-        if is_sure(&self.delay_s, 0.0) {
-            let side = if self.delay_s.value > 0.0 { "late" } else { "early" };
-            let sign = self.delay_s.value.signum();
-            parts.push(format!("is {} {side}", shown(&self.delay_s, 1e3 * sign, " ms")));
-        }
-        if is_sure(&self.clock_rate, 0.0) {
-            let side = if self.clock_rate.value > 0.0 { "later" } else { "earlier" };
-            let sign = self.clock_rate.value.signum();
-            let rate = shown(&self.clock_rate, 1e3 * sign, " ms");
-            parts.push(format!("comes {rate} {side} with every second"));
-        }
-        let left = in_digits(self.left, 3) + &after_number(&self.unit);
-        let share = in_digits(100.0 * self.left / self.range, 2);
-        let left = format!("{left} rms remain, {share} % of the range");
-        match parts.is_empty() {
-            true => format!("{b} and {a} have the same gain, offset and clock; {left}."),
-            false => format!("Compared with {a}, {b} {}; {left}.", listed(&parts)),
-        }
-    }
-}
-
-/// The correlation of two columns at their best lag.
-#[derive(Debug, Clone, Copy, Default)]
-struct Likeness {
-    /// Samples by which the second column is late.
-    lag: f64,
-    /// Correlation at that lag; negative if one column is upside down.
-    r: f64,
-    at_zero: f64,
-}
-
-impl Likeness {
-    fn of(x: &[f64], y: &[f64], reach: usize) -> Self {
-        let reach = reach.min((x.len().max(3) - 3) / 2);
-        let signed = |sign: f64| {
-            let y: Vec<f64> = y.iter().map(|y| sign * y).collect();
-            // a constant column is like none
-            lag(x, &y, reach).map_or_else(
-                |_| Self::default(),
-                |l| Self { lag: l.samples, r: l.correlation, at_zero: l.correlation_at_zero },
-            )
-        };
-        let (up, down) = (signed(1.0), signed(-1.0));
-        // half a period of a periodic motion looks like the other sign
-        match up.r < NEAR * down.r {
-            true => Self { r: -down.r, ..down },
-            false => up,
-        }
-    }
-
-    /// The likeness of the columns that are most alike.
-    fn best(pairs: impl Iterator<Item = [Vec<f64>; 2]>, reach: usize) -> Self {
-        let all = pairs.map(|[x, y]| Self::of(&x, &y, reach));
-        all.max_by(|x, y| x.r.abs().total_cmp(&y.r.abs())).unwrap_or_default()
-    }
-
-    /// The line from the first to the second column at the best lag.
-    fn line(&self, x: &[f64], y: &[f64]) -> Line {
-        let lag = self.lag.round() as isize;
-        let (early, late) = ((-lag).max(0) as usize, lag.max(0) as usize);
-        let pairs = || x[early..].iter().zip(&y[late..]);
-        let n = pairs().count() as f64;
-        let mean = |of: &dyn Fn(f64, f64) -> f64| pairs().map(|(x, y)| of(*x, *y)).sum::<f64>() / n;
-        let (mx, my) = (mean(&|x, _| x), mean(&|_, y| y));
-        let (xx, xy) = (mean(&|x, _| (x - mx).powi(2)), mean(&|x, y| (x - mx) * (y - my)));
-        let gain = xy / xx.max(f64::MIN_POSITIVE);
-        let offset = my - gain * mx;
-        Line { gain, offset, left: pairs().map(|(x, y)| y - gain * x - offset).collect() }
-    }
-}
-
 /// A rough line through two columns, from which noise and tolerances are estimated.
 struct Line {
     gain: f64,
@@ -505,11 +337,6 @@ impl Line {
             }
         })
     }
-}
-
-/// Number of samples of a time, at least those of [`LATE`].
-fn reach(dt_s: f64, time_s: f64) -> usize {
-    ((time_s / dt_s).round() as usize).max(LATE.1)
 }
 
 /// A column of a recording, in words.
@@ -568,126 +395,4 @@ fn chosen(a: &Trial, b: &Trial, asked: &[String]) -> Result<Vec<[String; 2]>, Pr
         ))),
         None => Ok(out),
     }
-}
-
-fn too_short(a: &Trial, b: &Trial, common_s: f64) -> ProblemError {
-    let found = format!("{} and {} have {common_s:.3} s in common", a.name, b.name);
-    ProblemError::too_little(found, "record both at the same time for 20 s or more")
-}
-
-/// Sample time, s; infinite for a single sample.
-fn step_s(trial: &Trial) -> f64 {
-    1.0 / trial.rate_hz().unwrap_or(0.0)
-}
-
-/// Time in which both were recorded, if `shift_s` is added to the clock of the first, s.
-fn common_s(a: &Trial, b: &Trial, shift_s: f64) -> f64 {
-    let end = |t: &Trial| t.time_s[t.len() - 1];
-    (end(a) + shift_s).min(end(b)) - (a.time_s[0] + shift_s).max(b.time_s[0])
-}
-
-/// Time that aligns the starts of two recordings whose clocks share no time, s; otherwise 0.
-fn base_s(a: &Trial, b: &Trial) -> f64 {
-    if common_s(a, b, 0.0) > 0.0 { 0.0 } else { b.time_s[0] - a.time_s[0] }
-}
-
-/// Returns the time in which the first recording is shifted in addition to [`base_s`], and notes.
-fn aligned(
-    a: &Trial,
-    b: &Trial,
-    columns: &[[String; 2]],
-) -> Result<(f64, Vec<String>), ProblemError> {
-    a.check()?;
-    b.check()?;
-    let (base_s, dt_s) = (base_s(a, b), step_s(a).max(step_s(b)));
-    if !dt_s.is_finite() {
-        return Err(too_short(a, b, 0.0));
-    }
-    let mut notes = Vec::new();
-    if base_s != 0.0 {
-        notes
-            .push("the clocks share no time; delays count from the start of each recording".into());
-    }
-    let look = |shift_s: f64, reach_s: f64| {
-        let both = merged(a, b, columns, shift_s);
-        let pairs = both.channels.chunks(2).map(|c| [c[0].values.clone(), c[1].values.clone()]);
-        Likeness::best(pairs, reach(dt_s, reach_s))
-    };
-    let coarse_s = a.duration_s().min(b.duration_s()) / COARSE as f64;
-    let thinned = |trial: &Trial, name: &str| {
-        let values = trial.channel(name).unwrap_or(&[]);
-        let time_s = |i: usize| trial.time_s[0] + i as f64 * coarse_s;
-        let at = |i| interpolated((&trial.time_s, values), time_s(i), f64::INFINITY);
-        (0..COARSE).map_while(at).collect::<Vec<f64>>()
-    };
-    let pairs = columns.iter().map(|[x, y]| [thinned(a, x), thinned(b, y)]);
-    let far_s = b.time_s[0] - a.time_s[0] + Likeness::best(pairs, COARSE / 2).lag * coarse_s;
-    let given = look(base_s, LATE.0);
-    let far = look(far_s, LATE.0.max(2.0 * coarse_s));
-    let is_far = (far_s - base_s - given.lag * dt_s).abs() > LATE.0;
-    let is_better = 1.0 - far.r.abs() < BETTER * (1.0 - given.r.abs());
-    let is_long = common_s(a, b, far_s) > 0.5 * a.duration_s().min(b.duration_s());
-    let (mut shift_s, best) = match is_far && is_better && is_long {
-        true => (far_s - base_s, far),
-        false => (0.0, given),
-    };
-    if best.at_zero.abs() < NEAR * best.r.abs() {
-        shift_s += best.lag * dt_s;
-    }
-    // whole samples, so that samples on the same grid stay as they are
-    shift_s = (shift_s / dt_s).round() * dt_s;
-    if shift_s != 0.0 {
-        let (by_s, a, b) = (in_digits(shift_s, 4), &a.name, &b.name);
-        notes.push(format!(
-            "{b} is {by_s} s later than {a} by cross-correlation, and is shifted before the fit"
-        ));
-    }
-    Ok((shift_s, notes))
-}
-
-/// Both recordings at the sample times of the slower one, in the time in which both were recorded.
-/// The columns alternate; `shift_s` is added to the clock of the first recording.
-fn merged(a: &Trial, b: &Trial, columns: &[[String; 2]], shift_s: f64) -> Trial {
-    let times: Vec<f64> = match step_s(a) > 1.01 * step_s(b) {
-        true => a.time_s.iter().map(|t| t + shift_s).collect(),
-        false => b.time_s.clone(),
-    };
-    let has = |trial: &Trial, t: f64| {
-        interpolated((&trial.time_s, &trial.time_s), t, BRIDGED * step_s(trial)).is_some()
-    };
-    let times: Vec<f64> = times.into_iter().filter(|t| has(a, t - shift_s) && has(b, *t)).collect();
-    let column = |trial: &Trial, name: &str, as_name: String, shift_s: f64| {
-        let values = trial.channel(name).unwrap_or(&[]);
-        let at = |t: &f64| interpolated((&trial.time_s, values), t - shift_s, f64::INFINITY);
-        Channel { name: as_name, values: times.iter().filter_map(at).collect() }
-    };
-    let both = |[x, y]: &[String; 2]| {
-        [column(a, x, format!("first {x}"), shift_s), column(b, y, y.clone(), 0.0)]
-    };
-    let channels = columns.iter().flat_map(both).collect();
-    let start_s = times.first().copied().unwrap_or(0.0);
-    let time_s = times.iter().map(|t| t - start_s).collect();
-    Trial { name: format!("{} and {}", a.name, b.name), time_s, channels }
-}
-
-/// Interpolates with a cubic through four samples, linearly next to an end; `None` outside the
-/// samples and in gaps longer than `longest_s`.
-fn interpolated((time_s, values): (&[f64], &[f64]), t: f64, longest_s: f64) -> Option<f64> {
-    // a time stamp that was shifted is equal but for rounding
-    let after = time_s.partition_point(|own| *own < t - 1e-9);
-    let (t1, x1) = (*time_s.get(after)?, *values.get(after)?);
-    if (t1 - t).abs() <= 1e-9 {
-        return Some(x1);
-    }
-    let before = after.checked_sub(1)?;
-    let nodes = match before > 0 && after + 1 < time_s.len() {
-        true => before - 1..after + 2,
-        false => before..after + 1,
-    };
-    let weight = |i: usize| {
-        let others = nodes.clone().filter(|j| *j != i);
-        others.map(|j| (t - time_s[j]) / (time_s[i] - time_s[j])).product::<f64>()
-    };
-    let value = nodes.clone().map(|i| values[i] * weight(i)).sum();
-    (t1 - time_s[before] <= longest_s).then_some(value)
 }

@@ -105,6 +105,19 @@ fn a_long_memory_is_named_wherever_the_trials_begin() {
     }
 }
 
+/// Without a pressure column, re-tuning absorbs most of a chamber that grows: parameters end at the ends of their
+/// tolerances, and around them a chamber that grows explains nothing.
+#[test]
+fn an_effect_that_re_tuning_has_absorbed_is_found_around_the_parameters_as_shipped() {
+    let effects = effect("chamber_volume", &[("g", 0.3)]);
+    for seed in 1..4 {
+        let found = run(session(&RigParams::default(), &effects, false, seed), &[], &shallow());
+        assert_eq!(found.verdict(), VerdictKind::Effect, "{seed}: {}", found.sentence);
+        assert_eq!(found.named(), ["chamber_volume"]);
+        assert!(found.candidates[0].closed > 0.95, "{seed}: {}", found.sentence);
+    }
+}
+
 #[test]
 fn turned_numbers_answer_as_the_simulator_does() {
     let effects = effect("gauge_relaxation", &[("c", 0.3), ("tau", 0.1)]);

@@ -40,7 +40,7 @@ use crate::{
 };
 
 /// Share of the probability that the 95 % set covers.
-const COVERED: f64 = 0.95;
+pub(crate) const COVERED: f64 = 0.95;
 
 /// The properties of a hypothesis on which the posterior depends.
 #[derive(Debug, Clone, Copy)]

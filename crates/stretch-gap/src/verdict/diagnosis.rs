@@ -182,7 +182,8 @@ struct Written {
     /// Effects that may be missing instead of a named one: those in the smallest collection of sets
     /// that holds 95 % of the probability.
     tied: Vec<String>,
-    /// Effects that were found but close less than `least_gap`.
+    /// Effects that were found but are not named, because they close less than `least_gap` and are not
+    /// certain, or are similar to a named effect.
     faint: Vec<String>,
     /// Part of the gap that a partial answer does not explain.
     unexplained: Option<Unexplained>,

@@ -131,7 +131,12 @@ impl AtBounds {
 impl Case<'_> {
     /// Returns the names that belong to a kind of answer.
     fn naming(&self, kind: VerdictKind, thresholds: &Thresholds) -> Naming {
-        let all = Naming::of(self.candidates, self.shares, thresholds);
+        let specs = self.simulator.effects();
+        let has_twin = |name: &str, other: &str| {
+            specs.iter().any(|s| s.name == name && s.twins.iter().any(|twin| twin == other))
+        };
+        let are_twins = |a: &str, b: &str| has_twin(a, b) || has_twin(b, a);
+        let all = Naming::of(self.candidates, self.shares, thresholds, &are_twins);
         match kind {
             VerdictKind::Effect | VerdictKind::Partial => all,
             // Effects that are probable but small are reported below the headline.

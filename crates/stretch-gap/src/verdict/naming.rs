@@ -4,7 +4,9 @@
 //! A significant effect may still be irrelevant: with 50 000 samples, a score of sixty nats may
 //! correspond to a hundred-thousandth of the gap. Therefore the part of the gap that an effect
 //! closes in one of its stages, on fitted or on test trials, must be a relevant gap by itself, and
-//! the effect must close a part of the gap on trials that were not fitted; otherwise the effect is
+//! the effect must close a part of the gap on trials that were not fitted. A further effect that
+//! closes less is named if the sets that contain it have 95 % of the probability, unless it is a twin
+//! of a named effect: a deviation of that effect's form would look like it. Otherwise the effect is
 //! reported as faint. Alternatives come from the smallest collection of sets that holds 95 % of the
 //! probability, and from the sets that close as much of the gap on test trials: at least the lower end
 //! of the 95 % interval of the most probable set. Their probability may be low only because the forms
@@ -12,7 +14,11 @@
 //! probable set in a single effect, the two effects in which they differ are a tie.
 
 use crate::{
-    evidence::{candidates::Candidate, probability::covering, shares::EffectShare},
+    evidence::{
+        candidates::Candidate,
+        probability::{COVERED, covering},
+        shares::EffectShare,
+    },
     problem::thresholds::Thresholds,
 };
 
@@ -23,17 +29,19 @@ pub(crate) struct Naming {
     pub(crate) named: Vec<String>,
     /// Pairs of a name and an alternative effect.
     pub(crate) ties: Vec<(String, String)>,
-    /// Effects that were found but close less of the gap than an effect must close to be named.
+    /// Effects that were found but are not named.
     pub(crate) faint: Vec<String>,
 }
 
 impl Naming {
     /// Groups the effects of the most probable candidate and finds their alternatives; `shares`
-    /// refer to the gap on trials that were not fitted.
+    /// refer to the gap on trials that were not fitted, and `are_twins` returns whether two effects
+    /// are similar.
     pub(crate) fn of(
         candidates: &[Candidate],
         shares: &[EffectShare],
         thresholds: &Thresholds,
+        are_twins: &dyn Fn(&str, &str) -> bool,
     ) -> Self {
         let Some(first) = candidates.first() else { return Self::default() };
         let share = |name: &str| shares.iter().find(|s| s.effect == name);
@@ -47,6 +55,17 @@ impl Naming {
         if named.is_empty() && !faint.is_empty() {
             named.push(faint.remove(0));
         }
+        let probability = |name: &String| -> f64 {
+            let sets = candidates.iter().filter(|c| c.effects.contains(name));
+            sets.map(|c| c.probability).sum()
+        };
+        let is_certain = |name: &mut String| {
+            share(name).is_none_or(|s| s.closes > 0.0)
+                && probability(name) >= COVERED
+                && !named.iter().any(|other| are_twins(name, other))
+        };
+        let certain: Vec<String> = faint.extract_if(.., is_certain).collect();
+        named.extend(certain);
         let closes_alike = |c: &Candidate| c.closed >= first.closed_ci[0];
         let held = covering(&candidates.iter().map(|c| c.probability).collect::<Vec<_>>());
         let rivals = candidates.iter().enumerate().skip(1);
@@ -119,7 +138,7 @@ mod tests {
             candidate(&["slack", "leak"], 0.04),
         ];
         let shares = [share("slack", 0.95), share("sag", 0.0)];
-        let naming = Naming::of(&candidates, &shares, &Thresholds::frozen());
+        let naming = Naming::of(&candidates, &shares, &Thresholds::frozen(), &|_, _| false);
         assert_eq!(
             (naming.named.as_slice(), naming.faint.as_slice()),
             (&["slack".to_owned()][..], &["sag".to_owned()][..])
@@ -128,25 +147,33 @@ mod tests {
         assert!((naming.probability(&candidates) - 0.96).abs() < 1e-12);
         // An effect that closes nothing on trials that were not fitted is not named.
         let fitted = [share("slack", 0.95), EffectShare { closes: -0.01, ..share("sag", 0.4) }];
-        assert_eq!(Naming::of(&candidates, &fitted, &Thresholds::frozen()), naming);
+        assert_eq!(Naming::of(&candidates, &fitted, &Thresholds::frozen(), &|_, _| false), naming);
         // A set that closes as much of the gap is a tie, whatever its probability. A set that closes
         // less is no tie.
         let ties = |closed| {
             let other = Candidate { closed, ..candidate(&["lowpass"], 0.001) };
             let both = [candidate(&["slip"], 0.999), other];
-            Naming::of(&both, &[share("slip", 0.9)], &Thresholds::frozen()).ties
+            Naming::of(&both, &[share("slip", 0.9)], &Thresholds::frozen(), &|_, _| false).ties
         };
         assert_eq!(ties(0.8), [("slip".into(), "lowpass".into())]);
         assert_eq!(ties(0.79), []);
+        // A small effect is named if it is certain and no twin of a named effect.
+        let sure = [candidate(&["slack", "sag"], 0.97), candidate(&["slack"], 0.03)];
+        let small = [share("slack", 0.95), share("sag", 0.01)];
+        for (are_twins, named) in [(false, &["slack", "sag"][..]), (true, &["slack"])] {
+            let naming = Naming::of(&sure, &small, &Thresholds::frozen(), &move |_, _| are_twins);
+            assert_eq!(naming.named, named);
+        }
         // If all effects are small, the strongest is named nevertheless.
         let weak = Naming::of(
             &candidates,
             &[share("slack", 0.0), share("sag", 0.0)],
             &Thresholds::frozen(),
+            &|_, _| false,
         );
         assert_eq!(weak.named, ["slack"]);
         assert_eq!(
-            Naming::of(&[candidate(&[], 1.0)], &[], &Thresholds::frozen()),
+            Naming::of(&[candidate(&[], 1.0)], &[], &Thresholds::frozen(), &|_, _| false),
             Naming::default()
         );
     }

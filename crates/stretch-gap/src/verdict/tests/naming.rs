@@ -74,7 +74,7 @@ fn names_part_the_first_set() {
     let mut ties = 0;
     for _ in 0..5000 {
         let (candidates, shares) = drawn(&mut random);
-        let naming = Naming::of(&candidates, &shares, &thresholds);
+        let naming = Naming::of(&candidates, &shares, &thresholds, &|_, _| false);
         let both: Vec<&String> = naming.named.iter().chain(&naming.faint).collect();
         let parted: BTreeSet<&String> = both.iter().copied().collect();
         assert_eq!(parted.len(), both.len());
@@ -91,19 +91,22 @@ fn names_part_the_first_set() {
     assert!(ties > 100, "{ties} ties are enough to say something");
 }
 
-/// An effect that closes less than `least_gap` is not named together with a larger one.
+/// The strongest effect is named. A further effect is named only if it closes `least_gap` or is certain.
 #[test]
 fn what_is_named_counts() {
     let mut random = RandomGenerator::new(5, 0);
     let thresholds = Thresholds::frozen();
     for _ in 0..5000 {
         let (candidates, shares) = drawn(&mut random);
-        let naming = Naming::of(&candidates, &shares, &thresholds);
+        let naming = Naming::of(&candidates, &shares, &thresholds, &|_, _| false);
         let share = |name: &String| shares.iter().find(|s| s.effect == *name);
-        let counts =
-            |name: &String| share(name).is_some_and(|s| s.closes_excess >= thresholds.least_gap);
-        if naming.named.len() > 1 {
-            assert!(naming.named.iter().all(counts), "{naming:?}");
-        }
+        let certain = |name: &String| {
+            let sets = candidates.iter().filter(|c| c.effects.contains(name));
+            sets.map(|c| c.probability).sum::<f64>() >= 0.95
+        };
+        let counts = |name: &String| {
+            share(name).is_some_and(|s| s.closes_excess >= thresholds.least_gap) || certain(name)
+        };
+        assert!(naming.named.iter().skip(1).all(counts), "{naming:?}");
     }
 }

@@ -65,19 +65,20 @@ impl Naming {
                 && !named.iter().any(|other| are_twins(name, other))
         };
         let certain: Vec<String> = faint.extract_if(.., is_certain).collect();
-        named.extend(certain);
-        let closes_alike = |c: &Candidate| c.closed >= first.closed_ci[0];
+        // Without an effect that closes little, every set closes as much.
+        let closes_alike =
+            |c: &Candidate, lost| c.closed >= first.closed_ci[0] && !certain.contains(lost);
         let held = covering(&candidates.iter().map(|c| c.probability).collect::<Vec<_>>());
-        let rivals = candidates.iter().enumerate().skip(1);
-        let rivals = rivals.filter(|(i, c)| *i < held || closes_alike(c)).map(|(_, c)| c);
         let mut ties = Vec::new();
-        for rival in rivals {
+        for (i, rival) in candidates.iter().enumerate().skip(1) {
             if let Some((lost, new)) = replaced(&first.effects, &rival.effects)
-                && named.contains(lost)
+                && (named.contains(lost) || certain.contains(lost))
+                && (i < held || closes_alike(rival, lost))
             {
                 ties.push((lost.clone(), new.clone()));
             }
         }
+        named.extend(certain);
         Self { named, ties, faint }
     }
 
@@ -158,7 +159,9 @@ mod tests {
         assert_eq!(ties(0.8), [("slip".into(), "lowpass".into())]);
         assert_eq!(ties(0.79), []);
         // A small effect is named if it is certain and no twin of a named effect.
-        let sure = [candidate(&["slack", "sag"], 0.97), candidate(&["slack"], 0.03)];
+        let sets: [(&[&str], f64); 3] =
+            [(&["slack", "sag"], 0.97), (&["slack"], 0.02), (&["slack", "leak"], 0.01)];
+        let sure = sets.map(|(effects, probability)| candidate(effects, probability));
         let small = [share("slack", 0.95), share("sag", 0.01)];
         for (are_twins, named) in [(false, &["slack", "sag"][..]), (true, &["slack"])] {
             let naming = Naming::of(&sure, &small, &Thresholds::frozen(), &move |_, _| are_twins);

@@ -58,6 +58,12 @@ def compare(
     StretchError
         If the recordings show no common motion or cannot be compared. The message says what to do.
 
+    Warns
+    -----
+    DoubtWarning
+        If samples count as lost because a column has no number there (code `missing_samples`), or if the time stamps seem to be in
+        milliseconds (`slow_clock`).
+
     Examples
     --------
     The second recorder is 35 ms late, and has another gain.

@@ -61,8 +61,8 @@ def compare(
     Warns
     -----
     DoubtWarning
-        If samples count as lost because a column has no number there (code `missing_samples`), or if the time stamps seem to be in
-        milliseconds (`slow_clock`).
+        If samples count as lost because a column has no number there (code `missing_samples`), or if the time stamps seem to
+        be in milliseconds (`slow_clock`).
 
     Examples
     --------

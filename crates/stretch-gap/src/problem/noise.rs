@@ -34,9 +34,11 @@ const MEMORIES: [f64; 9] = [1.5, 2.2, 3.3, 5.0, 7.5, 11.0, 17.0, 25.0, 38.0];
 const SHARES: usize = 19;
 /// Number of samples in each of two neighbouring medians, whose difference shows jumps.
 const MEDIAN_OF: usize = 11;
-/// Kurtosis of these differences from which a channel jumps. Normal noise has 3. Noise whose
-/// standard deviation doubles half of the time has 4.1.
+/// Kurtosis of these differences from which a channel jumps. Noise whose standard deviation doubles
+/// half of the time has 4.1.
 const JUMPING: f64 = 5.0;
+/// Kurtosis of a normal distribution.
+const NORMAL: f64 = 3.0;
 /// Smallest number of windows that show jumps: normal noise reaches a kurtosis of 5 in less than
 /// one of 1000 recordings.
 const FEWEST_OF_JUMPS: usize = 24;
@@ -139,7 +141,8 @@ impl Noise {
     /// ```
     ///
     /// which is 3 for normal noise of any spectrum. Single outliers hardly change medians. If the
-    /// kurtosis is at least 5, only white noise is estimated, from the faster half of the waves.
+    /// kurtosis is at least 5, and that of x_(i+1) - x_i at least 3, only white noise is estimated,
+    /// from the faster half of the waves.
     ///
     /// ```
     /// use stretch_gap::{RandomGenerator, Noise, WINDOW};
@@ -173,7 +176,7 @@ impl Noise {
         let mut fitted = shapes.fit(&powers, whole.len(), stated);
         // A signal that rests between two steps of its converter jumps between them.
         let is_above_step = 2.0 * fitted.white > step;
-        if is_still && is_above_step && shapes.kurtosis_of_jumps(&whole) >= JUMPING {
+        if is_still && is_above_step && shapes.jumps(&whole) {
             let shapes = Shapes::new(false, dt_s);
             fitted = shapes.fit(&shapes.mean_powers(&whole), whole.len(), stated);
             fitted.jumps = true;
@@ -279,27 +282,23 @@ impl Shapes {
         &self.transform * values
     }
 
-    /// Returns the kurtosis of the differences d of [`Noise::of_windows`], from windows without
-    /// their parabolas and without hum; 0 if there are too few windows.
-    fn kurtosis_of_jumps(&self, windows: &[&Vec<f64>]) -> f64 {
-        if windows.len() < FEWEST_OF_JUMPS {
-            return 0.0;
-        }
-        let (mut squares, mut fourths, mut count) = (0.0, 0.0, 0.0);
-        for window in windows {
+    /// Whether the channel jumps. The differences d of [`Noise::of_windows`] are taken without
+    /// parabolas and without hum. Hum whose phase changes is not removed completely, but makes the
+    /// steps from sample to sample less than normal, and jumps make them more.
+    fn jumps(&self, windows: &[&Vec<f64>]) -> bool {
+        let steps = windows.iter().flat_map(|w| w.windows(2).map(|pair| pair[1] - pair[0]));
+        let differences = windows.iter().flat_map(|window| {
             let (all, mut used) = (self.amplitudes(window), DVector::zeros(WINDOW));
             self.waves.iter().for_each(|&k| used[k] = all[k]);
             let values = self.cosines.tr_mul(&used);
             let parts = values.as_slice().windows(MEDIAN_OF);
             let medians: Vec<f64> = parts.filter_map(|part| median(part.to_vec())).collect();
-            for (before, after) in medians.iter().zip(&medians[MEDIAN_OF..]) {
-                let square = (after - before).powi(2);
-                squares += square;
-                fourths += square * square;
-                count += 1.0;
-            }
-        }
-        count * fourths / (squares * squares).max(f64::MIN_POSITIVE)
+            let pairs = medians.iter().zip(&medians[MEDIAN_OF..]);
+            pairs.map(|(before, after)| after - before).collect::<Vec<f64>>()
+        });
+        windows.len() >= FEWEST_OF_JUMPS
+            && kurtosis(steps) > NORMAL
+            && kurtosis(differences) >= JUMPING
     }
 
     /// Returns the mean power of every wave. Each mean omits the largest tenth of the powers, so
@@ -420,6 +419,14 @@ fn bends(stretch: &[f64]) -> Vec<f64> {
     let rounding = |x: &[f64]| ROUNDING * x.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let pairs = second_differences(stretch).zip(stretch.windows(3));
     pairs.map(|(bend, x)| if bend.abs() > rounding(x) { bend } else { 0.0 }).collect()
+}
+
+/// Returns the kurtosis of values whose mean is 0.
+fn kurtosis(values: impl Iterator<Item = f64>) -> f64 {
+    let (count, squares, fourths) = values.fold((0.0, 0.0, 0.0), |(count, squares, fourths), x| {
+        (count + 1.0, squares + x * x, fourths + x.powi(4))
+    });
+    count * fourths / (squares * squares).max(f64::MIN_POSITIVE)
 }
 
 /// Returns the median, the larger of two middle values; `None` if there are no values.
@@ -585,7 +592,14 @@ mod tests {
         });
         assert!(jumping.jumps() && jumping.slow().0 == 0.0, "{jumping:?}");
         approx::assert_relative_eq!(jumping.sd(), 1.0, max_relative = NOISE_LEVEL);
-        let others: [Change<'_>; 4] = [
+        let mut phase = 0.0;
+        let others: [Change<'_>; 5] = [
+            &mut |i, noise, random| {
+                phase += 0.015 * random.gauss();
+                let turn = std::f64::consts::PI * i as f64 + phase;
+                let size = 8.0 * (1.0 + 0.2 * (0.011 * i as f64).sin());
+                noise + size * (turn.sin() + 0.3 * (2.0 * turn - phase).sin())
+            },
             &mut |_, noise, random| if random.unit() < 0.01 { 20.0 * noise } else { noise },
             &mut |i, noise, _| noise + 3.0 * (std::f64::consts::TAU * 0.4 * i as f64).cos(),
             &mut |i, noise, _| if (i / WINDOW).is_multiple_of(2) { noise } else { 2.0 * noise },

@@ -57,7 +57,7 @@ pub(crate) fn units(ratio: f64, sd: f64, unit: &str) -> Option<String> {
 ///
 /// ```
 /// use stretch_gap::units_of_factor;
-/// assert_eq!(units_of_factor(57.3, ["", ""]), Some(["rad", "deg"]));
+/// assert_eq!(units_of_factor(57.3, ["rad", ""]), Some(["rad", "deg"]));
 /// assert_eq!(units_of_factor(1000.0, ["", "mV"]), Some(["V", "mV"]));
 /// assert_eq!(units_of_factor(1.7, ["", ""]), None);
 /// ```

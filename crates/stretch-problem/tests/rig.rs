@@ -89,8 +89,8 @@ fn a_slow_amplifier_is_named_and_measured_whatever_the_number_of_threads() {
     assert_eq!(text(&one), text(&two));
 }
 
-/// A memory of 25 s is longer than the pauses. Whether a rig settled before the first trial, before every trial, or
-/// before none, is estimated.
+/// A memory of 25 s is longer than the pauses. Whether a rig was in a steady state before the first trial, before
+/// every trial, or before none, is estimated.
 #[test]
 fn a_long_memory_is_named_wherever_the_trials_begin() {
     let effects = effect("muscle_creep", &[("c", 0.2), ("tau", 25.0)]);

@@ -25,7 +25,7 @@ pub(super) enum TunedParameter {
     /// How far ahead of its row every second switch of the commands acts: the even switches (0) or
     /// the odd switches (1).
     CommandLead(usize),
-    /// The initial state of a stage's memories, between the state after the motion before and a settled state: at the
+    /// The initial state of a stage's memories, between the state after the motion before and a steady state: at the
     /// first trial (0) or at all later trials (1).
     InitialState(RigStage, usize),
 }
@@ -69,11 +69,11 @@ pub(super) fn parameters(
         .unzip()
 }
 
-/// Standard deviation, around 0, of the prior of the settled share in the initial state. A rig that had settled before
-/// the session or before every trial (share 1) is plausible.
+/// Standard deviation, around 0, of the prior of the share of the steady state in the initial state. A rig in a steady
+/// state before the session or before every trial (share 1) is plausible.
 const INITIAL_STATE: f64 = 0.4;
 
-/// The initial state of a stage's memories: 0 as after the motion before, 1 as if the rig had settled where the trial
+/// The initial state of a stage's memories: 0 as after the motion before, 1 as in a steady state where the trial
 /// begins. The motion before the first trial came from the other end of the stroke. The chamber has no such
 /// parameters, because its pressure is measured.
 fn initial_states(kind: &RigStage, trials: usize) -> Vec<(ParameterSpec, TunedParameter)> {
@@ -138,7 +138,7 @@ pub(super) struct TunedRig {
     pub(super) offset: f64,
     /// How far ahead of their rows commands act, samples.
     pub(super) leads: Leads,
-    /// Share of the settled state in the initial state of the muscle at the first and at later trials, 0 to 1.
+    /// Share of the steady state in the initial state of the muscle at the first and at later trials, 0 to 1.
     pub(super) initial_muscle: [f64; 2],
     /// The same of the gauge.
     pub(super) initial_gauge: [f64; 2],

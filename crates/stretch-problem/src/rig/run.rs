@@ -37,7 +37,7 @@ pub(super) struct Setting<'a> {
     /// Step of integration of stages that commands drive, s.
     pub(super) step_s: f64,
     pub(super) grid: Grid,
-    /// Share of the settled state in the initial state of the stage at the first and at later trials, 0 to 1.
+    /// Share of the steady state in the initial state of the stage at the first and at later trials, 0 to 1.
     pub(super) initial_shares: [f64; 2],
     pub(super) input_noise: Option<u64>,
     /// Input of the stage that replaces the measured one, all trials concatenated.
@@ -109,8 +109,13 @@ impl Setting<'_> {
     }
 
     pub(super) fn after_pause(&self, trial: usize) -> Start {
+        Start::Carried { rest_s: self.rest_s(trial) }
+    }
+
+    /// Time at rest before a trial, s; 0 if the trial continues the one before after a gap.
+    fn rest_s(&self, trial: usize) -> f64 {
         let trials = &self.rig.bench.about.spec().trials;
-        let rest_s = match trial.checked_sub(1) {
+        let pause_s = match trial.checked_sub(1) {
             Some(before) => {
                 let end = trials[before].start_s
                     + trials[before].samples as f64 * self.rig.bench.about.spec().dt_s;
@@ -119,41 +124,49 @@ impl Setting<'_> {
             None => 15.0,
         };
         // The motion to the new start took about a second of the pause.
-        Start::Carried { rest_s: (rest_s - 1.0).max(0.0) }
+        (pause_s - 1.0).max(0.0)
     }
 
     /// Sets the memory that a stage has of the motion before a trial.
     ///
     /// As a rule a muscle that is vented at the session's start was filled before, so play and creep
     /// begin from the filled side, and later trials begin in the state that the trial before left. A
-    /// rig that had settled before every trial (which waited for long, or was simulated) remembers no
-    /// such motion. The initial state lies between the two. The share is a parameter of the recording:
+    /// rig that was in a steady state before every trial (which waited for long, or was simulated)
+    /// remembers no such motion. The initial state lies between the two. The share is a parameter of the recording:
     ///
     /// ```text
-    /// cells = moved + share (settled - moved)
+    /// cells = moved + share (steady - moved)
     /// ```
     ///
-    /// The function moves a memory of the motion before the trial towards the memory of a stage that
-    /// settled where the trial begins. `begin` runs a stage with a memory at the trial's first sample, so that the
+    /// The function moves a memory of the motion before the trial towards the memory of a stage in
+    /// its steady state where the trial begins. `fresh` returns an empty memory. `begin` runs a stage with a memory at the trial's first sample, so that the
     /// trial follows without a pause.
     fn set_initial_state(
         &self,
         trial: usize,
         memory: &mut Memory,
-        mut settled: Memory,
+        fresh: impl FnOnce() -> Memory,
         mut begin: impl FnMut(&mut Memory, Start) -> Result<(), ProblemError>,
     ) -> Result<(), ProblemError> {
         let share = self.initial_share(trial);
         if share > 0.0 {
+            let mut steady = fresh();
             begin(memory, self.after_pause(trial))?;
-            begin(&mut settled, Start::Settled)?;
-            memory.move_towards(&settled, share);
+            begin(&mut steady, Start::Settled)?;
+            memory.move_towards(&steady, share);
         }
         Ok(())
     }
 
+    /// Share of the steady state in the initial state of a trial. A trial that continues the one
+    /// before has the state that it left.
     fn initial_share(&self, trial: usize) -> f64 {
-        self.initial_shares[usize::from(trial > 0)]
+        let [first, later] = self.initial_shares;
+        match trial {
+            0 => first,
+            _ if self.rest_s(trial) > 0.0 => later,
+            _ => 0.0,
+        }
     }
 
     /// The reference, which follows the muscle, after lengths from `before` the session.
@@ -327,7 +340,7 @@ impl Setting<'_> {
         run(&mut memory, Start::Settled, At::Before, &mut filled)?;
         let mut shown = self.reference(&self.effects, &filled)?;
         self.each(count, out, |trial, own| {
-            self.set_initial_state(trial, &mut memory, fresh(), |memory, start| {
+            self.set_initial_state(trial, &mut memory, &fresh, |memory, start| {
                 run(memory, start, At::First(trial), &mut begun)
             })?;
             run(&mut memory, self.start(trial), At::Trial(trial), own)?;
@@ -383,16 +396,17 @@ impl Setting<'_> {
             let start_s = self.rig.bench.about.spec().trials[trial].start_s;
             let (length, pressure) = (self.refined(length), self.refined(pressure));
             let stage = dimmed.get(trial).and_then(Option::as_ref).unwrap_or(&stage);
-            if counts {
-                let start = self.after_pause(trial);
-                stage.run(&mut memory, start, start_s, &length, &pressure, own)?;
+            let start = if counts {
+                self.after_pause(trial)
             } else {
                 let first = [&length[..1], pressure.get(..1).unwrap_or(&[])];
-                self.set_initial_state(trial, &mut memory, stage.memory(), |memory, start| {
+                let fresh = || stage.memory();
+                self.set_initial_state(trial, &mut memory, fresh, |memory, start| {
                     Ok(stage.run(memory, start, start_s, first[0], first[1], &mut [0.0])?)
                 })?;
-                stage.run(&mut memory, self.start(trial), start_s, &length, &pressure, own)?;
-            }
+                self.start(trial)
+            };
+            stage.run(&mut memory, start, start_s, &length, &pressure, own)?;
             acting.follow(self.rig.bench.record(trial), own);
             Ok(())
         })
@@ -456,9 +470,12 @@ impl ReferenceSensor {
         let Self { stage, memory, work, .. } = self;
         work.clear();
         work.extend_from_slice(length);
-        setting.set_initial_state(trial, memory, stage.memory(), |memory, start| {
-            Ok(stage.run(memory, start, &work[..1], &mut [0.0])?)
-        })?;
+        setting.set_initial_state(
+            trial,
+            memory,
+            || stage.memory(),
+            |memory, start| Ok(stage.run(memory, start, &work[..1], &mut [0.0])?),
+        )?;
         Ok(stage.run(memory, setting.start(trial), work, length)?)
     }
 

@@ -165,6 +165,8 @@ mod tests {
         let small = [share("slack", 0.95), share("sag", 0.01)];
         for (are_twins, named) in [(false, &["slack", "sag"][..]), (true, &["slack"])] {
             let naming = Naming::of(&sure, &small, &Thresholds::frozen(), &move |_, _| are_twins);
+            // A set in which the small effect is replaced closes as much, and is no tie.
+            assert_eq!(naming.ties, []);
             assert_eq!(naming.named, named);
         }
         // If all effects are small, the strongest is named nevertheless.

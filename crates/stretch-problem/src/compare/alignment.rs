@@ -4,7 +4,7 @@ use stretch_data::{Channel, Trial, in_digits};
 use stretch_metrics::lag;
 
 use super::Line;
-use crate::error::ProblemError;
+use crate::{bench::straight_line, error::ProblemError};
 
 /// Longest delay that the fit of the clock reaches without a shift of the recordings, s, and in samples.
 pub(super) const LATE: (f64, usize) = (0.2, 20);
@@ -58,12 +58,7 @@ impl Likeness {
         let lag = self.lag.round() as isize;
         let (early, late) = ((-lag).max(0) as usize, lag.max(0) as usize);
         let pairs = || x[early..].iter().zip(&y[late..]);
-        let n = pairs().count() as f64;
-        let mean = |of: &dyn Fn(f64, f64) -> f64| pairs().map(|(x, y)| of(*x, *y)).sum::<f64>() / n;
-        let (mx, my) = (mean(&|x, _| x), mean(&|_, y| y));
-        let (xx, xy) = (mean(&|x, _| (x - mx).powi(2)), mean(&|x, y| (x - mx) * (y - my)));
-        let gain = xy / xx.max(f64::MIN_POSITIVE);
-        let offset = my - gain * mx;
+        let (offset, gain) = straight_line(|| pairs().map(|(x, y)| (*x, *y)), 0.0);
         Line { gain, offset, left: pairs().map(|(x, y)| y - gain * x - offset).collect() }
     }
 }

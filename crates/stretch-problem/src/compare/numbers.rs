@@ -8,6 +8,7 @@ use crate::fix::COVERS;
 
 /// Number of standard deviations from which a difference is put into the sentence.
 const SURE: f64 = 3.0;
+
 /// A number with its 95 % interval.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Estimate {

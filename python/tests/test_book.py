@@ -1,5 +1,6 @@
 """The Python code of the README and of the book runs from top to bottom, for each page in an empty folder."""
 
+import json
 import re
 from pathlib import Path
 
@@ -41,3 +42,37 @@ def test_the_worker_of_the_page_on_isaac_is_diagnosed(tmp_path):
     (tmp_path / "log.csv").write_text("\n".join(rows), encoding="utf-8")
     found = stretch_gap.diagnose(None, tmp_path / "problem.toml")
     assert found.probabilities["input.delay"] > 0.5, found.sentence
+
+
+def test_the_simulators_that_the_page_on_ranges_draws_hold_the_truth():
+    module = {}
+    exec(compile("\n".join(code("book/src/how-to/ranges.md", "python")), "ranges.md", "exec"), module)
+    time_s = np.arange(0, 40, 0.02)
+    push = 3 * np.sin(1.1 * time_s) + 2 * np.sign(np.sin(0.7 * time_s))
+
+    def servo(params, effects, inputs):
+        kept, angle, angles = np.exp(-0.02 / params["tau"]), 0.0, []
+        for u in inputs["push_V"]:
+            angle = kept * angle + (1 - kept) * params["gain"] * u
+            angles.append(angle)
+        return np.array(angles)
+
+    true = servo({"gain": 10.4, "tau": 0.11}, {}, {"push_V": push})
+    late = np.concatenate([np.repeat(true[0], 2), true[:-2]]) + np.random.default_rng(1).normal(scale=0.1, size=time_s.size)
+    found = stretch_gap.diagnose(
+        servo,
+        {"time_s": time_s, "push_V": push, "angle_deg": late},
+        parameters={"gain": (10.0, 1.0), "tau": (0.1, 0.01)},
+        output="angle_deg",
+        inputs="push_V",
+        wrap=["output.delay", "output.saturation"],
+    )
+    drawn = found.draw(400, seed=3)
+    ranges, random = json.loads(found.to_json())["ranges"], np.random.default_rng(3)
+    by_page = [module["draw"](ranges, random) for _ in range(400)]
+    truth = {"gain": 10.4, "tau": 0.11, "output.delay.delay_s": 0.04}
+    for simulators in (drawn, by_page):
+        values = np.array([[one[name] for name in truth] for one in simulators])
+        mean, sd = values.mean(0), values.std(0)
+        assert np.all(np.abs(mean - list(truth.values())) < 4 * sd)
+        assert np.corrcoef(values.T)[1, 2] < -0.5  # a longer delay looks like a slower servo

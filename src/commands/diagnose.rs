@@ -87,6 +87,11 @@ pub(crate) struct Args {
     /// Parameters are re-tuned and the found effects are added; an existing file is replaced.
     #[arg(long, value_name = "fixed.toml")]
     fix: Option<PathBuf>,
+    /// Write the joint distribution of the parameters
+    ///
+    /// For domain randomisation: JSON that YAML readers take as well.
+    #[arg(long, value_name = "ranges.json")]
+    ranges: Option<PathBuf>,
     /// Write code of each named effect into a new folder
     ///
     /// In C, Python and MATLAB.
@@ -185,7 +190,8 @@ pub(crate) fn run(args: Args) -> anyhow::Result<ExitCode> {
 
 fn diagnosed(args: Args) -> anyhow::Result<Diagnosis> {
     let is_there = args.data_set.as_os_str() == "-" || args.data_set.exists();
-    let files = [&args.report, &args.fix, &args.experiment].map(|path| path.as_deref());
+    let files =
+        [&args.report, &args.fix, &args.ranges, &args.experiment].map(|path| path.as_deref());
     args.json.share_stdout(files)?;
     ensure!(is_there, "{}: there is no such file or folder", args.data_set.display());
     if let Some(folder) = args.snippets.as_deref().filter(|folder| folder.exists()) {
@@ -287,6 +293,14 @@ fn conclude(
     }
     if let Some(path) = &args.fix {
         said.push(write_fix(&mut outputs, path, examined)?);
+    }
+    match (&args.ranges, &examined.ranges) {
+        (Some(path), Ok(ranges)) => {
+            stage_text(&mut outputs, path, &ranges.to_text())?;
+            said.push(format!("wrote {}", path.display()));
+        }
+        (Some(path), Err(why)) => missing.push(format!("{} is not written: {why}", path.display())),
+        _ => {}
     }
     if let Some(folder) = &args.snippets {
         said.push(write_snippets(&mut outputs, folder, &examined.implementations)?);

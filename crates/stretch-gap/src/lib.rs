@@ -31,6 +31,7 @@ pub use evidence::{
 pub use fit::{
     identifiability::{Identified, Knowledge},
     sample_fit::{SampleFit, SampleValue, fit_samples},
+    spread::{Known, Place, Spread},
     starts::Starts,
 };
 pub use missing::{Course, Factor, Passage, Proposed, ProposedTerm, RateForm, SignalScale, Term};

@@ -145,7 +145,7 @@ fn test_trials_are_never_fitted() {
     let (one, of_one) = evidenced(&plain, &options);
     let (two, of_two) = other.diagnosed_by(&options);
     assert_eq!((&of_one.retuned, &of_one.best), (&of_two.retuned, &of_two.best));
-    assert_eq!(of_one.retuned_sd, of_two.retuned_sd);
+    assert_eq!(of_one.retuned_spread, of_two.retuned_spread);
     assert_eq!(one.identifiability, two.identifiability);
     for a in &one.candidates {
         // A set that is worse than the empty set on these test trials is not a candidate.

@@ -16,6 +16,7 @@ use crate::{
     fix::{Fix, Fixed, NoFix},
     implement::Implementation,
     problem::Problem,
+    ranges::Ranges,
     transfer::transfer,
 };
 
@@ -35,6 +36,8 @@ pub struct Examined {
     pub implementations: Vec<Implementation>,
     /// The fixed simulator as a file, or why there is no such file.
     pub fix: Result<Fix, NoFix>,
+    /// Joint distribution of the parameters, or why there is none.
+    pub ranges: Result<Ranges, NoFix>,
 }
 
 impl fmt::Debug for Examined {
@@ -122,6 +125,7 @@ impl Problem {
             experiment: proposal.map(|p| p.trial),
             implementations: source.implementations(&diagnosis, &evidence),
             fix: source.fixed(&diagnosis, &evidence),
+            ranges: Ranges::of(&diagnosis, &evidence, self.simulator().description()),
             diagnosis,
             evidence,
         })
@@ -144,6 +148,7 @@ impl Examined {
                 Fixed::Rig(_) => None,
                 Fixed::Problem(file) => Some(file.to_toml()),
             }),
+            ranges: self.ranges.as_ref().ok(),
             data_set: &self.name,
             seed: self.seed,
             version: env!("CARGO_PKG_VERSION"),
@@ -193,6 +198,8 @@ struct Written<'a> {
     fixed_rig: Option<&'a RigFile>,
     /// The text of the problem file that `--fix` writes, or null.
     fixed_problem: Option<String>,
+    /// Joint distribution of the parameters for domain randomisation, which `--ranges` writes, or null.
+    ranges: Option<&'a Ranges>,
     /// Name of the data set or recording.
     data_set: &'a str,
     /// Seed of the intervals.

@@ -4,7 +4,9 @@ use std::{f64::consts::TAU, path::Path};
 
 use stretch_data::{Remarks, RigFile, after_number, in_digits};
 use stretch_effects::EffectParameter;
-use stretch_gap::{Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Model, VerdictKind};
+use stretch_gap::{
+    Candidate, Diagnosis, EffectSpec, EffectValue, Evidence, Model, Spread, VerdictKind,
+};
 use stretch_sim::{SimError, Tolerance};
 
 use crate::black_box::ProblemSpec;
@@ -70,11 +72,11 @@ pub enum NoFix {
 #[derive(Clone, Copy)]
 pub(crate) struct Chosen<'a> {
     pub(crate) model: &'a Model,
-    /// One standard deviation of every nominal parameter.
-    pub(crate) sd: &'a [f64],
+    /// How precisely the parameters are known.
+    pub(crate) spread: &'a Spread,
     diagnosis: &'a Diagnosis,
     /// The candidate whose effects are written; `None` if the diagnosis names no effects.
-    found: Option<&'a Candidate>,
+    pub(crate) found: Option<&'a Candidate>,
 }
 
 /// Standard deviations to either side that hold 95 % of a Gaussian.
@@ -97,12 +99,12 @@ impl<'a> Chosen<'a> {
             VerdictKind::Effect | VerdictKind::Partial => {
                 let first = diagnosis.candidates.first().zip(evidence.candidates.first());
                 let (found, model) = first.ok_or(NoFix::Unknown)?;
-                let sd = evidence.candidate_sds.first().map_or(&[][..], Vec::as_slice);
-                Ok(Self { model, sd, diagnosis, found: Some(found) })
+                let spread = evidence.candidate_spreads.first().ok_or(NoFix::Unknown)?;
+                Ok(Self { model, spread, diagnosis, found: Some(found) })
             }
             VerdictKind::NoGap | VerdictKind::Parameters => Ok(Self {
                 model: &evidence.retuned,
-                sd: &evidence.retuned_sd,
+                spread: &evidence.retuned_spread,
                 diagnosis,
                 found: None,
             }),
@@ -135,8 +137,12 @@ impl<'a> Chosen<'a> {
 
     /// Tolerance of a re-tuned parameter, relative if the old tolerance was relative.
     pub(crate) fn tolerance(&self, index: usize, value: f64, old: Tolerance) -> Tolerance {
-        let found = self.sd.get(index).copied().unwrap_or(0.0);
-        let sd = found.min(old.sd(value)).max(LEAST * value.abs()).max(f64::MIN_POSITIVE);
+        let sd = self
+            .spread
+            .of_parameter(index)
+            .min(old.sd(value))
+            .max(LEAST * value.abs())
+            .max(f64::MIN_POSITIVE);
         match old {
             Tolerance::Relative(_) => Tolerance::Relative(sd / value.abs()),
             _ => Tolerance::Absolute(sd),
@@ -145,7 +151,7 @@ impl<'a> Chosen<'a> {
 
     /// The comment behind a re-tuned parameter.
     pub(crate) fn remark(&self, index: usize, unit: &str, (was, value): (f64, f64)) -> String {
-        let sd = self.sd.get(index).copied().unwrap_or(0.0);
+        let sd = self.spread.of_parameter(index);
         format!(
             "was {}; 95 %: {} .. {}{}",
             in_digits(was, 4),

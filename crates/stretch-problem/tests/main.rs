@@ -21,6 +21,7 @@ mod pendulum;
 mod plant;
 mod predict;
 mod profile;
+mod ranges;
 mod repeated;
 mod rests;
 mod rig;

@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
+import numpy as np
+
 from . import _stretch, figures, html, timeline
 from . import problem as entries
 from ._stretch import Refused, StretchError
@@ -424,6 +426,46 @@ class Diagnosis:
         implement = self._answer.get("implement", [])
         return fix(self.parameters, self.effects, implement, self._functions, self._again, self._why_not(), self._earlier)
 
+    def draw(self, count: int, seed: int = 0) -> list[dict[str, float]]:
+        """Draw simulators for domain randomisation.
+
+        The values of a simulator are drawn together, because the data often determine a combination of parameters better than
+        each of them. If the data cannot tell which effect is missing, the simulators have different effects, in proportion to
+        the probabilities.
+
+        Parameters
+        ----------
+        count : int
+            Number of simulators.
+        seed : int, default 0
+            Seed of the random numbers.
+
+        Returns
+        -------
+        list of dict of str to float
+            For each simulator the re-tuned parameters by name, and the parameters of its effects by `effect.parameter`.
+
+        Raises
+        ------
+        StretchError
+            If the recording is wrong or the gap is not explained: the ranges would not contain the real machine.
+
+        Examples
+        --------
+        >>> simulators = found.draw(100)
+        >>> list(simulators[0])
+        ['compliance', 'output.delay.delay_s', 'output.delay.empty']
+        >>> bool(np.std([one["output.delay.delay_s"] for one in simulators]) < 1e-4)
+        True
+        """
+        ranges = self._answer.get("ranges")
+        if not ranges:
+            raise StretchError(f"there are no ranges to draw from, because the verdict is {self.verdict!r}: {self.sentence}")
+        random = np.random.default_rng(seed)
+        sets = ranges["sets"]
+        chosen = random.choice(len(sets), count, p=[one["probability"] for one in sets])
+        return [_drawn(sets[at], random) for at in chosen]
+
     def _why_not(self) -> str:
         """Return the reason why the fix cannot be run, if it cannot."""
         if not self._session:
@@ -823,6 +865,16 @@ def _corrected(answer: Mapping[str, Any]) -> dict[str, float]:
 
 EFFECTS = '{"friction": (0.0, 5.0)}, with the least and the greatest value; effects around the simulator belong in wrap'
 PARAMETERS = '{"mass": stretch_gap.Parameter(10.0, relative=0.1)}'
+
+
+def _drawn(one: Mapping[str, Any], random: np.random.Generator) -> dict[str, float]:
+    """Draw the values of one simulator with a set of effects."""
+    moved = np.array(one["factor"]) @ random.standard_normal(len(one["parameters"]))
+    values = {}
+    for p, d in zip(one["parameters"], moved):
+        value = p["value"] * np.exp(d) if p["is_log"] else p["value"] + d
+        values[p["name"]] = float(np.clip(value, p["least"], p["greatest"]))
+    return values | one["fixed"]
 
 
 def _example(data: Any, trials: Sequence[entries.Trial]) -> str:

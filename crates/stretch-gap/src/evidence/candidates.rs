@@ -218,8 +218,8 @@ pub(crate) fn posterior(
     };
     let candidates = posterior.sets.iter().filter_map(of).collect();
     evidence.candidates = posterior.sets.iter().map(|w| w.hypothesis.model.clone()).collect();
-    let sds = posterior.sets.iter().map(|w| w.hypothesis.parameter_sd.clone());
-    evidence.candidate_sds = sds.collect();
+    let spreads = posterior.sets.iter().map(|w| w.hypothesis.spread.clone());
+    evidence.candidate_spreads = spreads.collect();
     Ok((posterior, candidates))
 }
 
@@ -290,9 +290,8 @@ fn effect_values(simulator: &dyn Simulator, hypothesis: &Hypothesis) -> Vec<Effe
     for &e in &hypothesis.effects {
         let spec = &simulator.effects()[e];
         let values = hypothesis.model.effect(e).unwrap_or(&[]);
-        let sds = hypothesis.effect_sd.get(&e);
         for (i, (p, value)) in spec.parameters.iter().zip(values).enumerate() {
-            let sd = sds.and_then(|s| s.get(i)).copied().unwrap_or(0.0);
+            let sd = hypothesis.spread.of_effect(e, i, *value);
             all.push(EffectValue {
                 effect: spec.name.clone(),
                 name: p.name.to_string(),
@@ -351,9 +350,9 @@ pub(crate) fn shifts(
     agrees: bool,
 ) -> Vec<ParameterShift> {
     let bent = &evidence.retuned.parameters;
-    let (fitted, sd) = match agrees {
-        true => (bent, &evidence.retuned_sd),
-        false => (&evidence.best.parameters, &evidence.best_sd),
+    let (fitted, spread) = match agrees {
+        true => (bent, &evidence.retuned_spread),
+        false => (&evidence.best.parameters, &evidence.best_spread),
     };
     let all = simulator.parameters().iter().enumerate().filter(|(_, p)| p.sd > 0.0);
     all.map(|(i, p)| ParameterShift {
@@ -361,7 +360,7 @@ pub(crate) fn shifts(
         unit: p.unit.clone(),
         nominal: p.nominal,
         fitted: fitted[i],
-        sd: sd[i],
+        sd: spread.of_parameter(i),
         sigmas: (fitted[i] - p.nominal) / p.sd,
         bent: bent[i],
         bent_sigmas: (bent[i] - p.nominal) / p.sd,

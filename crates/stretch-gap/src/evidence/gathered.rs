@@ -15,6 +15,7 @@ use crate::{
         hypothesis::Hypothesis,
         prepared::PreparedProblem,
         score::{self, Misfit, excess, mean_square},
+        spread::Spread,
     },
     numerics::linear::dot,
     problem::{
@@ -77,12 +78,12 @@ pub struct Evidence {
     pub step: f64,
     /// Fitted model of every candidate, in the order of the candidates in the diagnosis.
     pub candidates: Vec<Model>,
-    /// Standard deviation of every re-tuned nominal parameter, 0 if it is exact.
-    pub retuned_sd: Vec<f64>,
-    /// Standard deviation of every nominal parameter of every candidate.
-    pub candidate_sds: Vec<Vec<f64>>,
-    /// Standard deviation of every nominal parameter with the best set.
-    pub(crate) best_sd: Vec<f64>,
+    /// How precisely the re-tuned nominal parameters are known.
+    pub retuned_spread: Spread,
+    /// How precisely the parameters of every candidate are known.
+    pub candidate_spreads: Vec<Spread>,
+    /// How precisely the parameters of the best set are known.
+    pub(crate) best_spread: Spread,
     /// Reduced chi-square of the re-tuned nominal simulator by block, one entry per stage.
     pub(crate) nominal_blocks: Vec<Blocks>,
     /// Variance of the noise by stage, relative to its estimate: see the module documentation.
@@ -222,9 +223,9 @@ impl Evidence {
             retuned: problem.nominal.model.clone(),
             best: found.best.model.clone(),
             candidates: Vec::new(),
-            retuned_sd: problem.nominal.parameter_sd.clone(),
-            candidate_sds: Vec::new(),
-            best_sd: found.best.parameter_sd.clone(),
+            retuned_spread: problem.nominal.spread.clone(),
+            candidate_spreads: Vec::new(),
+            best_spread: found.best.spread.clone(),
             nominal_blocks,
             levels,
             best_effect: found.best.effects.first().copied(),

@@ -277,8 +277,7 @@ mod tests {
             effects: effects.into(),
             model: Model::default(),
             misfits: Vec::new(),
-            effect_sd: Default::default(),
-            parameter_sd: Vec::new(),
+            spread: Default::default(),
             score,
         }
     }

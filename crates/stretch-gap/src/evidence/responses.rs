@@ -125,9 +125,8 @@ fn turned<'a>(problem: &PreparedProblem<'a>, best: &Hypothesis, stage: usize) ->
             continue;
         }
         let fitted = best.model.effect(effect).unwrap_or_default();
-        let sd = best.effect_sd.get(&effect).map_or(&[][..], Vec::as_slice);
         for (parameter, (spec, &fitted)) in own.parameters.iter().zip(fitted).enumerate() {
-            let values = values(spec, fitted, sd.get(parameter).copied().unwrap_or(0.0));
+            let values = values(spec, fitted, best.spread.of_effect(effect, parameter, fitted));
             if spec.is_fitted() && !values.is_empty() {
                 turned.push(Turned { effect, parameter, spec, fitted, values });
             }

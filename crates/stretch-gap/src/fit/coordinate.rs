@@ -14,12 +14,13 @@
 
 use stretch_effects::EffectParameter;
 
-use crate::problem::simulator::{Model, Simulator};
+use crate::problem::{
+    simulator::{Model, Simulator},
+    spec::REACH,
+};
 
 /// Standard deviation of a form around its usual value, as a share of its range.
 const FORM_SD: f64 = 0.35;
-/// Largest distance of a re-tuned parameter from its nominal value, in tolerances.
-pub(crate) const REACH: f64 = 3.0;
 
 /// One coordinate of a fit.
 #[derive(Debug, Clone, Copy)]

@@ -1,10 +1,8 @@
 //! A hypothesis: the effects that the rig is assumed to have and the simulator lacks, with all
 //! fitted parameters.
 
-use std::collections::BTreeMap;
-
 use crate::{
-    fit::score::Misfit,
+    fit::{score::Misfit, spread::Spread},
     problem::{simulator::Model, spec::EffectSpec},
 };
 
@@ -18,10 +16,8 @@ pub(crate) struct Hypothesis {
     pub(crate) model: Model,
     /// Misfit of the model in each stage.
     pub(crate) misfits: Vec<Misfit>,
-    /// One standard deviation of the parameters of each effect.
-    pub(crate) effect_sd: BTreeMap<usize, Vec<f64>>,
-    /// One standard deviation of every nominal parameter; 0 for parameters that were not re-tuned.
-    pub(crate) parameter_sd: Vec<f64>,
+    /// How precisely the parameters are known.
+    pub(crate) spread: Spread,
     /// Log-likelihood ratio to the re-tuned nominal simulator, nats, with penalties: see
     /// [`crate::fit::score`].
     pub(crate) score: f64,
@@ -32,5 +28,14 @@ impl Hypothesis {
     /// for another cause.
     pub(crate) fn is_at_bound(&self, effect: usize, catalogue: &[EffectSpec]) -> bool {
         self.model.effect(effect).is_some_and(|values| catalogue[effect].is_at_bound(values))
+    }
+
+    /// The largest standard deviation of any parameter of an effect.
+    pub(crate) fn greatest_sd(&self) -> f64 {
+        let sd = |effect, index, value| self.spread.of_effect(effect, index, value);
+        let all = self.model.effects.iter().flat_map(|(effect, values)| {
+            values.iter().enumerate().map(move |(index, value)| sd(*effect, index, *value))
+        });
+        all.fold(0.0, f64::max)
     }
 }

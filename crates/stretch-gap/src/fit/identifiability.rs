@@ -180,9 +180,7 @@ pub(crate) fn identified(
 }
 
 fn is_at_bound(spec: &ParameterSpec, value: f64) -> bool {
-    let reach = crate::fit::coordinate::REACH * spec.sd;
-    let (low, high) =
-        (spec.least.max(spec.nominal - reach), spec.greatest.min(spec.nominal + reach));
+    let [low, high] = spec.reach();
     // A parameter whose nominal value is one of its bounds (for example no friction) may stay there
     // without being reported as at a bound.
     let near =

@@ -26,6 +26,8 @@
 //! what the fixed nominal parameters could have explained (Brynjarsdottir and O'Hagan 2014, doi
 //! 10.1088/0266-5611/30/11/114007).
 
+use std::ops::Range;
+
 use nalgebra::{DMatrix, DVector};
 use rayon::iter::ParallelIterator;
 
@@ -36,10 +38,12 @@ use crate::{
         identifiability::Information,
         metric::Column,
         score::Misfit,
+        spread::{Equations, Spread, gradient_noise},
     },
-    numerics::linear::{Cholesky, boxed},
+    numerics::linear::boxed,
     problem::{
         error::{GapError, if_possible},
+        sample_roles::Role,
         simulator::Model,
     },
 };
@@ -52,10 +56,8 @@ pub(crate) struct Fitted {
     pub(crate) cost: f64,
     /// The misfit of each stage that was fitted.
     pub(crate) misfits: Vec<Misfit>,
-    /// One standard deviation of each effect parameter, in the order of the model's effects.
-    pub(crate) effect_sd: Vec<Vec<f64>>,
-    /// One standard deviation of each nominal parameter that was re-tuned.
-    pub(crate) parameter_sd: Vec<(usize, f64)>,
+    /// How precisely the parameters are known.
+    pub(crate) spread: Spread,
     /// The coordinates that were fitted, with their bounds.
     pub(crate) coordinates: Vec<(Coordinate, [f64; 2])>,
     /// N of the module documentation.
@@ -402,35 +404,41 @@ impl<'a, 'b> Descent<'a, 'b> {
         -(slope + 0.5 * d.dot(&(&self.normal * &d)))
     }
 
-    /// Computes misfits, and standard deviations by Laplace's approximation: the covariance is
-    /// N^-1.
-    fn finish(self) -> Fitted {
+    /// Computes the misfits, and how precisely the parameters are known.
+    fn finish(mut self) -> Fitted {
         let stages = self.stages.iter().zip(&self.residuals);
         let misfits = stages.map(|(&s, r)| self.compare.misfit(s, r)).collect();
-        let spread = spreads(self.normal.clone());
-        let effects = self.model.effects.iter();
-        let mut effect_sd: Vec<Vec<f64>> = effects.map(|(_, v)| vec![0.0; v.len()]).collect();
-        let mut parameter_sd = Vec::new();
-        for ((c, _), spread) in self.coordinates.iter().zip(spread) {
-            let sd = |value: f64| spread * c.slope(value);
-            match *c {
-                Coordinate::Nominal { index, .. } => {
-                    parameter_sd.push((index, sd(self.model.parameters[index])));
-                }
-                Coordinate::Linear { slot, index, .. } | Coordinate::Log { slot, index, .. } => {
-                    effect_sd[slot][index] = sd(self.model.effects[slot].1[index]);
-                }
-            }
-        }
+        self.normal_equations();
+        let spread = Spread::of(&Equations {
+            coordinates: &self.coordinates,
+            model: &self.model,
+            normal: &self.normal,
+            gradient: &self.gradient,
+            weight: self.compare.weight(),
+            noise: self.gradient_noise(),
+        });
         let Self { model, cost, coordinates, normal, is_settled, .. } = self;
-        Fitted { model, cost, misfits, effect_sd, parameter_sd, coordinates, normal, is_settled }
+        Fitted { model, cost, misfits, spread, coordinates, normal, is_settled }
     }
-}
 
-/// Square roots of the diagonal of the inverse of a normal matrix.
-fn spreads(mut normal: DMatrix<f64>) -> Vec<f64> {
-    for i in 0..normal.nrows() {
-        normal[(i, i)] += RIDGE;
+    /// Returns the covariance of A'V^-1 r according to the residual, over all stages.
+    fn gradient_noise(&self) -> DMatrix<f64> {
+        let (compare, roles) = (self.compare, &self.compare.roles);
+        let n = self.coordinates.len();
+        let mut sum = DMatrix::zeros(n, n);
+        for (s, (&stage, residual)) in self.stages.iter().zip(&self.residuals).enumerate() {
+            let clean = compare.clean(stage, &residual.values);
+            let fitted = roles.of_role(Role::Fit).filter(|segment| segment.to <= clean.len());
+            let blocks = fitted.flat_map(|segment| {
+                let starts = (segment.from..segment.to).step_by(roles.block);
+                starts.map(|from| from..segment.to.min(from + roles.block))
+            });
+            let blocks: Vec<Range<usize>> = blocks.collect();
+            let columns = self.columns.iter().map(|own| Some(&own.get(s)?.as_ref()?.values[..]));
+            let columns: Vec<_> = columns.collect();
+            let measured = compare.metrics[stage].measured(roles, Role::Fit);
+            sum += gradient_noise(&columns, &clean, &blocks, measured);
+        }
+        sum
     }
-    Cholesky::of(normal).inverse().diagonal().iter().map(|v| v.max(0.0).sqrt()).collect()
 }

@@ -30,6 +30,7 @@ pub(crate) mod octaves;
 pub(crate) mod prepared;
 pub(crate) mod sample_fit;
 pub(crate) mod score;
+pub(crate) mod spread;
 pub(crate) mod starts;
 
 #[cfg(test)]

@@ -12,8 +12,6 @@
 //!
 //! A [`PreparedProblem`] is complete: nothing in it is set later.
 
-use std::collections::BTreeMap;
-
 use rayon::prelude::*;
 
 use crate::{
@@ -25,6 +23,7 @@ use crate::{
         identifiability::{Identified, Information, identified},
         levenberg_marquardt::{Effort, FINE, Fitted, HELD},
         score::{LEARNT, Misfit, Observations, gap, score, shared},
+        spread::Spread,
         starts::Starts,
     },
     problem::{
@@ -426,10 +425,10 @@ fn retuned(
         groups.par_iter().map(|group| compare.fit(group, start.clone(), &[], effort)).collect();
     let mut model = start.clone();
     let mut misfits = Vec::new();
-    let mut parameter_sd = vec![0.0; model.parameters.len()];
+    let mut spread = Spread::default();
     let mut information = Vec::new();
     for (group, fitted) in groups.iter().zip(fits?) {
-        fitted.parameter_sd.iter().for_each(|(p, sd)| parameter_sd[*p] = *sd);
+        spread.join(&fitted.spread);
         for &p in group.iter().flat_map(|stage| &simulator.stages()[*stage].parameters) {
             model.parameters[p] = fitted.model.parameters[p];
         }
@@ -437,8 +436,7 @@ fn retuned(
         misfits.extend(fitted.misfits);
     }
     misfits.sort_by_key(|misfit| misfit.stage);
-    let (effects, effect_sd) = (Vec::new(), BTreeMap::new());
-    let all = Hypothesis { effects, model, misfits, effect_sd, parameter_sd, score: 0.0 };
+    let all = Hypothesis { effects: Vec::new(), model, misfits, spread, score: 0.0 };
     Ok((all, information))
 }
 

@@ -53,6 +53,11 @@ impl Cholesky {
         2.0 * diagonal.iter().map(|x| x.ln()).sum::<f64>()
     }
 
+    /// Returns L.
+    pub(crate) fn lower(&self) -> DMatrix<f64> {
+        self.0.l()
+    }
+
     /// Returns A^-1.
     pub(crate) fn inverse(&self) -> DMatrix<f64> {
         self.0.inverse()

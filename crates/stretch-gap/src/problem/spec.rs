@@ -87,7 +87,22 @@ pub struct ParameterSpec {
     pub is_evidence: bool,
 }
 
+/// Largest distance of a re-tuned parameter from its nominal value, in tolerances.
+pub(crate) const REACH: f64 = 3.0;
+
 impl ParameterSpec {
+    /// Returns the least and the greatest value that re-tuning may give the parameter.
+    ///
+    /// ```
+    /// use stretch_gap::ParameterSpec;
+    /// let stiffness = ParameterSpec { least: 0.5, ..ParameterSpec::new("k", "N/mm", 1.0).within(0.2) };
+    /// assert_eq!(stiffness.reach(), [0.5, 1.0 + 3.0 * 0.2]);
+    /// ```
+    pub fn reach(&self) -> [f64; 2] {
+        let reach = REACH * self.sd;
+        [self.least.max(self.nominal - reach), self.greatest.min(self.nominal + reach)]
+    }
+
     /// Creates an exact parameter; [`ParameterSpec::within`] adds a tolerance.
     pub fn new(name: &str, unit: &str, nominal: f64) -> Self {
         Self {

@@ -6,7 +6,6 @@ use stretch_data::ends;
 
 use crate::{
     fit::{
-        coordinate::REACH,
         hypothesis::Hypothesis,
         levenberg_marquardt::{COARSE, Effort, FINE, possible},
         prepared::PreparedProblem,
@@ -16,6 +15,7 @@ use crate::{
         error::GapError,
         fault::Kind,
         simulator::{Model, Simulator},
+        spec::REACH,
         thresholds::Thresholds,
     },
     record::{
@@ -151,10 +151,7 @@ fn fitted(
         let fitted = problem.fit(stages, start.clone(), &[], effort)?;
         Ok(sets.join(&problem.nominal, vec![suspect.index(fault)], stages, fitted))
     }))?;
-    found.retain(|one| {
-        let sd = one.effect_sd.values().flatten().copied().fold(0.0, f64::max);
-        is_large(suspect, &one.model, sd)
-    });
+    found.retain(|one| is_large(suspect, &one.model, one.greatest_sd()));
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
     Ok(found)
 }

@@ -134,7 +134,7 @@ impl Gross {
         let found = |what, sentence| Self::of_column(what, column, sentence);
         Some(match fault.kind {
             Kind::Scale => {
-                let sd = hypothesis.effect_sd.values().flatten().fold(0.0, |a: f64, b| a.max(*b));
+                let sd = hypothesis.greatest_sd();
                 let is_output = column.output_of.is_some();
                 let units = units(1.0 / size, sd / size, &column.unit).filter(|_| is_output);
                 let is_exact = suspect.description().spec().parameters.iter().all(|p| p.sd == 0.0);

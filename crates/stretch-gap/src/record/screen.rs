@@ -17,16 +17,14 @@
 use rayon::prelude::*;
 
 use crate::{
-    fit::{
-        coordinate::REACH, levenberg_marquardt::possible, metric::Column as Weighted,
-        prepared::PreparedProblem,
-    },
+    fit::{levenberg_marquardt::possible, metric::Column as Weighted, prepared::PreparedProblem},
     problem::{
         altered::Altered,
         error::GapError,
         fault::{DELAY_S, Fault, Kind},
         sample_roles::Role,
         simulator::Model,
+        spec::REACH,
     },
     search::screen::Ground,
 };
@@ -214,7 +212,7 @@ impl<'a, 'p, 's> Bench<'a, 'p, 's> {
         let nominal = &self.problem.nominal;
         let retuned = (nominal.model.parameters[parameter] - spec.nominal) / spec.sd;
         // The tolerance is a prior of variance 1. Without it, the data would shift the value more.
-        let free = retuned / (1.0 - (nominal.parameter_sd[parameter] / spec.sd).powi(2));
+        let free = retuned / (1.0 - (nominal.spread.of_parameter(parameter) / spec.sd).powi(2));
         let is_far = free.abs() > REACH || retuned.abs() > END * REACH;
         if !is_far {
             return Vec::new();

@@ -19,6 +19,7 @@ use crate::{
         hypothesis::Hypothesis,
         levenberg_marquardt::{COARSE, Effort, FINE, Fitted, GLANCE, possible},
         prepared::PreparedProblem,
+        spread::Place,
     },
     problem::{
         error::{GapError, unless_lost},
@@ -191,17 +192,17 @@ impl<'a> Sets<'a> {
                 next.model.parameters[p] = fitted.model.parameters[p];
             }
         }
-        fitted.parameter_sd.iter().for_each(|(p, sd)| next.parameter_sd[*p] = *sd);
         let catalogue = self.problem.simulator().effects();
         next.model
             .effects
             .retain(|(e, _)| !catalogue[*e].touches.iter().any(|s| stages.contains(s)));
-        next.effect_sd.retain(|e, _| next.model.effects.iter().any(|(i, _)| i == e));
-        for ((e, values), sd) in fitted.model.effects.iter().zip(&fitted.effect_sd) {
-            next.model.effects.push((*e, values.clone()));
-            next.effect_sd.insert(*e, sd.clone());
-        }
+        next.model.effects.extend(fitted.model.effects);
         next.model.effects.retain(|(e, _)| next.effects.contains(e));
+        next.spread.join(&fitted.spread);
+        next.spread.retain(|place| match place {
+            Place::Nominal(_) => true,
+            Place::Effect { effect, .. } => next.model.effect(effect).is_some(),
+        });
         for misfit in fitted.misfits {
             let stage = misfit.stage;
             next.misfits[stage] = misfit;

@@ -65,7 +65,7 @@ fn assert_agrees(record: &Measured, counts: impl Fn(usize) -> bool, offset: f64)
         let apart = (nominal.model.parameters[p] - expected[p]).abs();
         assert!(apart < DAMPED * spec.sd, "{}: {apart} of {}", spec.name, spec.sd);
         approx::assert_relative_eq!(
-            nominal.parameter_sd[p],
+            nominal.spread.of_parameter(p),
             covariance[(p, p)].sqrt(),
             max_relative = DIFFERENCED
         );

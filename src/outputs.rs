@@ -12,8 +12,8 @@ use clap::{Arg, ArgMatches, Command};
 use stretch_data::files::guard_inputs;
 
 /// Options whose paths are written. All other paths are read.
-const OUTPUTS: [&str; 9] =
-    ["c", "experiment", "fix", "fixed", "json", "out", "report", "session", "snippets"];
+const OUTPUTS: [&str; 10] =
+    ["c", "experiment", "fix", "fixed", "json", "out", "ranges", "report", "session", "snippets"];
 
 /// Returns the long name of an option whose value is a path.
 fn option(argument: &Arg) -> Option<&str> {

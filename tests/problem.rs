@@ -137,6 +137,18 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     let bare = stretch().arg("predict").arg(&file).arg(&b).output().unwrap();
     let text = String::from_utf8_lossy(&bare.stderr).into_owned();
     assert!(!bare.status.success() && text.contains("it holds no effect that was found"), "{text}");
+    // Other people have the card, but not the recording that was fitted.
+    let there = fs::read(folder.path().join("a.csv")).unwrap();
+    fs::remove_file(folder.path().join("a.csv")).unwrap();
+    let out = predicted(&[]);
+    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(text.starts_with("The fix holds for these recordings. With brake"), "{text}");
+    let copy = folder.path().join("copy.csv");
+    fs::write(&copy, &there).unwrap();
+    let out = stretch().arg("predict").arg(&fixed).arg(&copy).output().unwrap();
+    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    assert!(text.contains("copy.csv is one of the recordings of the card"), "{text}");
+    fs::write(folder.path().join("a.csv"), there).unwrap();
     // The earlier name of the command.
     let old = stretch().arg("foretell").arg(&fixed).arg(&b).output().unwrap();
     let text = String::from_utf8_lossy(&old.stderr).into_owned();

@@ -3,6 +3,7 @@
 mod bench;
 mod black_box;
 mod by_trial;
+mod card;
 mod causes;
 mod compare;
 mod error;
@@ -28,6 +29,7 @@ pub use black_box::{
     StageEntry, State, TrialFile, closure,
 };
 pub use by_trial::{Apart, ByTrial, Heterogeneity, RunFit, q_values};
+pub use card::{Card, CardColumn, CardOutput, CardRecording};
 pub use causes::{Causes, causes};
 pub use compare::{Compared, Estimate, Octave, Pair};
 pub use error::ProblemError;

@@ -13,6 +13,7 @@ use stretch_recording::Recording;
 
 use crate::{
     black_box::{BlackBox, Checked, ProblemSpec, Source, velocity::of_position},
+    card::CardColumn,
     error::ProblemError,
     problem::Reading,
     words::wrapper_in_words,
@@ -21,6 +22,8 @@ use crate::{
 
 /// Largest distance beyond a fitted range that is not reported, as a share of the range.
 const MARGIN: f64 = 0.025;
+/// Largest error on new recordings with which a card still holds, in errors that the card states.
+const HOLDS: f64 = 1.5;
 /// Pause that is assumed between recordings without a start, s. It matters for an effect that
 /// drifts.
 pub const PAUSE_S: f64 = 15.0;
@@ -44,6 +47,8 @@ pub struct Prediction {
     pub largest_times_noise: f64,
     /// The new recordings; a recording with a long gap becomes several entries.
     pub trials: Vec<PredictedTrial>,
+    /// Whether the fix is as good on the new recordings as its card states; none without a card.
+    pub holds: Option<bool>,
     /// Notes on the recordings, in sentences.
     pub notes: Vec<String>,
 }
@@ -105,9 +110,21 @@ impl Prediction {
 
     /// The result in a sentence.
     pub fn sentence(&self) -> String {
+        let outside = self.trials.iter().any(|trial| !trial.extrapolated.is_empty());
+        let range = if outside { ", outside of the fitted range in part" } else { "" };
+        match self.holds {
+            Some(true) => format!("The fix holds for these recordings{range}. {}", self.result()),
+            Some(false) => {
+                format!("The fix does not hold for these recordings{range}. {}", self.result())
+            }
+            None => self.result(),
+        }
+    }
+
+    fn result(&self) -> String {
         if self.effects.is_empty() {
             return format!(
-                "the fix has no effect, so only the re-tuned parameters were tested: the largest error of the simulator is {:.1} \
+                "The fix has no effect, so only the re-tuned parameters were tested: the largest error of the simulator is {:.1} \
                  times the noise",
                 self.largest_times_noise
             );
@@ -150,7 +167,11 @@ pub fn predict(
         return Err(ProblemError::value(&shown, "it holds no effect that was found", hint));
     }
     reading.announce(fixed, &workers);
-    let mut spec = file.load()?;
+    // Others have the card, but not the recordings that were fitted.
+    let is_alone =
+        file.card.is_some() && file.files.iter().any(|one| !file.folder.join(&one.file).exists());
+    let files = if is_alone { Vec::new() } else { file.files.clone() };
+    let mut spec = ProblemSpec { files, ..file.clone() }.load()?;
     let fitted = spec.trials.len();
     for path in new {
         let mut trial = SessionTrial::from(Recording::read(path, &file.reading())?);
@@ -168,7 +189,12 @@ pub fn predict(
     }
     let bare = ProblemSpec { wrap: Vec::new(), without: Vec::new(), ..spec.clone() };
     let source = Arc::new(Workers::start(workers, Checked::new(bare)?.session())?);
-    Ok(Prediction { name: file.shown_name().to_owned(), ..predict_with(spec, fitted, source)? })
+    let mut found = predict_with(spec, fitted, source)?;
+    let known = file.card.iter().flat_map(|card| card.known(new));
+    found.notes.extend(known.map(|path| {
+        format!("{} is one of the recordings of the card, so it checks nothing", path.display())
+    }));
+    Ok(Prediction { name: file.shown_name().to_owned(), ..found })
 }
 
 /// Predicts the trials of a problem in memory from the index `fitted` on; see [`predict`].
@@ -180,7 +206,10 @@ pub fn predict_with(
     fitted: usize,
     source: Arc<dyn Source>,
 ) -> Result<Prediction, ProblemError> {
-    spec.trials[fitted..].iter_mut().for_each(|t| t.split = Split::Test);
+    // Without fitted recordings, the new ones stand in for them: nothing is fitted here.
+    let split = if fitted == 0 { Split::Fit } else { Split::Test };
+    spec.trials[fitted..].iter_mut().for_each(|t| t.split = split);
+    let card = spec.card.clone();
     // No further effect is looked for.
     spec.wrap.clear();
     spec.without.clear();
@@ -195,12 +224,19 @@ pub fn predict_with(
     }
     let outputs = [simulate(&with, &source)?, simulate(&without, &source)?];
     let session = with.session();
+    let of_card = card.as_ref().filter(|_| fitted == 0).map(|card| card.columns.clone());
+    let ranges = of_card.unwrap_or_else(|| CardColumn::all(&with));
     let trial = |at: usize| {
         let (name, samples) = (session.trials[at].name.clone(), &session.trials[at].samples);
         let seconds = samples.len() as f64 * session.dt_s;
         let stages = 0..session.stages.len();
         let outputs = stages.map(|stage| score(&with, stage, samples, &outputs)).collect();
-        PredictedTrial { name, seconds, outputs, extrapolated: extrapolated(&with, samples) }
+        PredictedTrial {
+            name,
+            seconds,
+            outputs,
+            extrapolated: extrapolated(&with, &ranges, samples),
+        }
     };
     let trials: Vec<_> = with.columns.sources_from(fitted).into_iter().map(trial).collect();
     if trials.is_empty() {
@@ -216,7 +252,26 @@ pub fn predict_with(
     let ratio = (all().map(|o| o.ratio.ln()).sum::<f64>() / all().count() as f64).exp();
     let largest_times_noise = all().map(|o| o.times_noise).fold(0.0, f64::max);
     let (name, dt_s) = ("problem".to_owned(), session.dt_s);
-    Ok(Prediction { schema: 2, name, effects, dt_s, ratio, largest_times_noise, trials, notes })
+    let holds = card.map(|card| {
+        let of =
+            |output: &PredictedOutput| card.outputs.iter().find(|own| own.column == output.column);
+        let is_as_good = |output: &PredictedOutput| {
+            let stated = of(output).map_or(1.0, |own| own.times_noise.max(1.0));
+            output.times_noise <= HOLDS * stated && (effects.is_empty() || output.ratio < 1.0)
+        };
+        all().all(is_as_good)
+    });
+    Ok(Prediction {
+        schema: 2,
+        name,
+        effects,
+        dt_s,
+        ratio,
+        largest_times_noise,
+        trials,
+        holds,
+        notes,
+    })
 }
 
 /// Names of the effects that act in every run.
@@ -278,12 +333,10 @@ fn score(
     }
 }
 
-/// Inputs, outputs and their rates that leave the range of the fitted recordings, in sentences.
-fn extrapolated(problem: &Checked, samples: &Range<usize>) -> Vec<String> {
+/// Inputs, outputs and their rates that leave the fitted ranges, in sentences.
+fn extrapolated(problem: &Checked, ranges: &[CardColumn], samples: &Range<usize>) -> Vec<String> {
     let (columns, dt_s) = (&problem.columns, problem.session().dt_s);
-    let (trials, fitted) = (&columns.ranges, columns.looked_at());
-    let sentence = |name: String, values: &[f64]| {
-        let (low, high) = ends(fitted.iter().flat_map(|range| &values[range.clone()]));
+    let sentence = |name: String, values: &[f64], [low, high]: [f64; 2]| {
         let margin = MARGIN * (high - low);
         let own = &values[samples.clone()];
         let outside = own.iter().filter(|x| **x < low - margin || **x > high + margin).count();
@@ -292,14 +345,15 @@ fn extrapolated(problem: &Checked, samples: &Range<usize>) -> Vec<String> {
         (outside > 0).then(|| format!("{name} is {least:.4} to {greatest:.4}, but {low:.4} to {high:.4} was fitted: {share:.1} % of the \
             recording is outside"))
     };
-    let mut names: Vec<&String> =
-        problem.session().stages.iter().flat_map(|s| s.inputs.iter().chain([&s.output])).collect();
-    names.sort_unstable();
-    names.dedup();
-    let of = |name: &String| {
-        let values = columns.all(name);
-        let rates = of_position(values, trials, dt_s);
-        [sentence(name.clone(), values), sentence(format!("the rate of {name}"), &rates)]
+    let of = |range: &CardColumn| {
+        let name = &range.name;
+        let values = columns.of(name).unwrap_or(&[]);
+        let rates = of_position(values, &columns.ranges, dt_s);
+        [
+            sentence(name.clone(), values, range.values),
+            sentence(format!("the rate of {name}"), &rates, range.rates),
+        ]
     };
-    names.into_iter().flat_map(of).flatten().collect()
+    let known = ranges.iter().filter(|range| columns.of(&range.name).is_some());
+    known.flat_map(of).flatten().collect()
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use stretch_data::{Channel, SessionTrial, Trial};
 use stretch_gap::RandomGenerator;
 use stretch_problem::{
-    Ask, EffectEntry, Parameter, Prediction, ProblemSpec, StageEntry, Tolerance, closure,
-    predict_with,
+    Ask, Card, CardColumn, CardOutput, EffectEntry, Parameter, Prediction, ProblemSpec, StageEntry,
+    Tolerance, closure, predict_with,
 };
 
 const DT_S: f64 = 0.01;
@@ -68,7 +68,41 @@ fn predicted_with(new: &[(f64, f64)], play: f64, change: impl Fn(&mut ProblemSpe
     let gear = closure(move |ask: &Ask<'_>| {
         Ok(shafts[..ask.trials * SAMPLES].iter().map(|x| ask.parameters[0] * x).collect())
     });
-    predict_with(spec, 2, Arc::new(gear)).expect("a prediction")
+    let fitted = if spec.trials.len() > new.len() { 2 } else { 0 };
+    predict_with(spec, fitted, Arc::new(gear)).expect("a prediction")
+}
+
+/// A card that states an error of 1.02 times the noise, and the ranges of the first two recordings.
+fn card() -> Card {
+    let output = CardOutput { column: "gear_deg".into(), rmse: 0.0204, times_noise: 1.02 };
+    let column = |name: &str, far: f64| CardColumn {
+        name: name.into(),
+        values: [-far, far],
+        rates: [-25.0 * far, 25.0 * far],
+    };
+    let columns = vec![column("gear_deg", 50.0), column("shaft_deg", 16.0)];
+    Card { outputs: vec![output], columns, ..Card::default() }
+}
+
+#[test]
+fn a_card_holds_for_a_machine_of_the_same_kind_without_the_fitted_recordings() {
+    let checked = |new: &[(f64, f64)], play: f64| {
+        predicted_with(new, play, |spec| {
+            spec.card = Some(card());
+            spec.stages[0].noise = Some(0.02);
+            spec.trials.drain(..2);
+        })
+    };
+    let found = checked(&[(9.5, 1.0), (8.0, 0.9)], 0.4);
+    assert_eq!((found.trials.len(), found.holds), (2, Some(true)), "{}", found.sentence());
+    assert!(found.sentence().starts_with("The fix holds for these recordings. With backlash"));
+    let far = checked(&[(15.0, 1.0)], 0.4);
+    assert_eq!(far.trials[0].extrapolated.len(), 2, "{:?}", far.trials[0].extrapolated);
+    assert!(far.sentence().contains("outside of the fitted range in part"), "{}", far.sentence());
+    let other = checked(&[(9.5, 1.0)], 0.6);
+    assert_eq!(other.holds, Some(false), "{}", other.sentence());
+    assert!(other.sentence().starts_with("The fix does not hold"), "{}", other.sentence());
+    assert_eq!(predicted(&[(9.5, 1.0)], 0.4).holds, None);
 }
 
 #[test]
@@ -120,5 +154,5 @@ fn parameters_that_were_not_re_tuned_are_noted() {
     assert!(notes(&|_| ()).1);
     assert!(!notes(&|spec| spec.parameters[0].tolerance = Tolerance::Exact).1);
     let (sentence, is_noted) = notes(&|spec| spec.wrapped.clear());
-    assert!(!is_noted && sentence.starts_with("the fix has no effect"), "{sentence}");
+    assert!(!is_noted && sentence.starts_with("The fix has no effect"), "{sentence}");
 }

@@ -132,6 +132,7 @@ fn a_page_of_a_prediction() {
         dt_s: 0.02,
         ratio: 0.0738,
         largest_times_noise: 1.55,
+        holds: None,
         trials: vec![
             trial("a.csv", &[]),
             trial("b.csv", &["command_V reaches 7.2, above the 5 of the fit"]),

@@ -870,11 +870,11 @@ PARAMETERS = '{"mass": stretch_gap.Parameter(10.0, relative=0.1)}'
 def _drawn(one: Mapping[str, Any], random: np.random.Generator) -> dict[str, float]:
     """Draw the values of one simulator with a set of effects."""
     moved = np.array(one["factor"]) @ random.standard_normal(len(one["parameters"]))
-    values = {}
+    values: dict[str, float] = dict(one["fixed"])
     for p, d in zip(one["parameters"], moved):
         value = p["value"] * np.exp(d) if p["is_log"] else p["value"] + d
         values[p["name"]] = float(np.clip(value, p["least"], p["greatest"]))
-    return values | one["fixed"]
+    return values
 
 
 def _example(data: Any, trials: Sequence[entries.Trial]) -> str:

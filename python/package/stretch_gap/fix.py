@@ -395,6 +395,15 @@ class Prediction:
         return float(self._answer["largest_times_noise"])
 
     @property
+    def holds(self) -> bool:
+        """Whether the fix holds for the recordings, bool.
+
+        It holds if the error of each output is at most 1.5 times that on the recordings of the diagnosis that were not fitted,
+        in multiples of the noise, and below the error without the effects.
+        """
+        return bool(self._answer["holds"])
+
+    @property
     def outputs(self) -> list[dict[str, Any]]:
         """Errors, list of dicts, one for each recording and output.
 

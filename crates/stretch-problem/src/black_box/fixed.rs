@@ -9,6 +9,7 @@ use stretch_gap::{Diagnosis, Evidence, Model, Simulator};
 
 use super::{BlackBox, catalogue::Acting, spec::ProblemSpec};
 use crate::{
+    card::Card,
     fix::{Chosen, Fix, Fixed, NoFix},
     problem::Diagnosable,
 };
@@ -94,6 +95,7 @@ impl Diagnosable for BlackBox {
             self.add(&mut file, effect, values);
             effects.push(name.clone());
         }
+        file.card = Some(Card::of(&self.problem, diagnosis, &effects));
         Ok(Fix { file: Fixed::Problem(Box::new(file)), effects, remarks })
     }
 }

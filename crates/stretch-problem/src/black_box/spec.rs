@@ -14,6 +14,7 @@ use stretch_effects::Kind;
 use stretch_recording::TimeUnit;
 use stretch_sim::Tolerance;
 
+use crate::card::Card;
 use crate::file::{SimulatorEntry, simulator, simulator_schema};
 
 /// A problem: what a `problem.toml` holds, and the recordings in memory.
@@ -94,6 +95,9 @@ pub struct ProblemSpec {
     /// The recordings; required unless the simulator is built in.
     #[serde(rename = "trial", default, skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<TrialFile>,
+    /// What was fitted and how well; `--fix` writes it, and `stretch predict` reads it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub card: Option<Card>,
     /// Kinds of effects of the user's own, which `wrap` may name in addition to the kinds of the catalogue.
     #[serde(skip)]
     pub kinds: Vec<&'static Kind>,

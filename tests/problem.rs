@@ -57,6 +57,11 @@ fn said(path: &Path, more: &[&str]) -> (bool, String) {
     (out.status.success(), text.split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
+/// A text without the line breaks at the width of the terminal.
+fn unfolded(text: &[u8]) -> String {
+    String::from_utf8_lossy(text).replace('\n', " ")
+}
+
 #[test]
 #[ignore = "needs python3 with NumPy; ./ci.sh runs it"]
 fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
@@ -120,7 +125,7 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     let to_json = json_to(&json);
     let files = ["--report", page.to_str().unwrap(), to_json.as_str()];
     let out = predicted(&files);
-    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    let text = unfolded(&out.stdout);
     assert!(
         out.status.success() && text.contains("With brake the simulator predicts 1 of 1"),
         "{text}"
@@ -141,12 +146,12 @@ fn with_numpy_a_folder_becomes_a_problem_and_a_worker_answers_it() {
     let there = fs::read(folder.path().join("a.csv")).unwrap();
     fs::remove_file(folder.path().join("a.csv")).unwrap();
     let out = predicted(&[]);
-    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    let text = unfolded(&out.stdout);
     assert!(text.starts_with("The fix holds for these recordings. With brake"), "{text}");
     let copy = folder.path().join("copy.csv");
     fs::write(&copy, &there).unwrap();
     let out = stretch().arg("predict").arg(&fixed).arg(&copy).output().unwrap();
-    let text = String::from_utf8_lossy(&out.stdout).into_owned();
+    let text = unfolded(&out.stdout);
     assert!(text.contains("copy.csv is one of the recordings of the card"), "{text}");
     fs::write(folder.path().join("a.csv"), there).unwrap();
     // The earlier name of the command.

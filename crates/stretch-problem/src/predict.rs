@@ -110,13 +110,9 @@ impl Prediction {
 
     /// The result in a sentence.
     pub fn sentence(&self) -> String {
-        let outside = self.trials.iter().any(|trial| !trial.extrapolated.is_empty());
-        let range = if outside { ", outside of the fitted range in part" } else { "" };
         match self.holds {
-            Some(true) => format!("The fix holds for these recordings{range}. {}", self.result()),
-            Some(false) => {
-                format!("The fix does not hold for these recordings{range}. {}", self.result())
-            }
+            Some(true) => format!("The fix holds for these recordings. {}", self.result()),
+            Some(false) => format!("The fix does not hold for these recordings. {}", self.result()),
             None => self.result(),
         }
     }
@@ -176,7 +172,7 @@ pub fn predict(
     for path in new {
         let mut trial = SessionTrial::from(Recording::read(path, &file.reading())?);
         trial.trial.name = path.display().to_string();
-        trial.split = Split::Test;
+        trial.split = split(fitted);
         spec.trials.push(trial);
     }
     // If the fitted recordings state no starts, `Checked` places all recordings one after the
@@ -206,9 +202,7 @@ pub fn predict_with(
     fitted: usize,
     source: Arc<dyn Source>,
 ) -> Result<Prediction, ProblemError> {
-    // Without fitted recordings, the new ones stand in for them: nothing is fitted here.
-    let split = if fitted == 0 { Split::Fit } else { Split::Test };
-    spec.trials[fitted..].iter_mut().for_each(|t| t.split = split);
+    spec.trials[fitted..].iter_mut().for_each(|t| t.split = split(fitted));
     let card = spec.card.clone();
     // No further effect is looked for.
     spec.wrap.clear();
@@ -272,6 +266,12 @@ pub fn predict_with(
         holds,
         notes,
     })
+}
+
+/// Split of the new recordings. Without fitted recordings they take the place of those, because a
+/// problem needs one; nothing is fitted in a prediction.
+fn split(fitted: usize) -> Split {
+    if fitted == 0 { Split::Fit } else { Split::Test }
 }
 
 /// Names of the effects that act in every run.

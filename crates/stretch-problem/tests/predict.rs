@@ -98,7 +98,6 @@ fn a_card_holds_for_a_machine_of_the_same_kind_without_the_fitted_recordings() {
     assert!(found.sentence().starts_with("The fix holds for these recordings. With backlash"));
     let far = checked(&[(15.0, 1.0)], 0.4);
     assert_eq!(far.trials[0].extrapolated.len(), 2, "{:?}", far.trials[0].extrapolated);
-    assert!(far.sentence().contains("outside of the fitted range in part"), "{}", far.sentence());
     let other = checked(&[(9.5, 1.0)], 0.6);
     assert_eq!(other.holds, Some(false), "{}", other.sentence());
     assert!(other.sentence().starts_with("The fix does not hold"), "{}", other.sentence());

@@ -415,7 +415,7 @@ impl<'a, 'b> Descent<'a, 'b> {
             normal: &self.normal,
             gradient: &self.gradient,
             weight: self.compare.weight(),
-            noise: self.gradient_noise(),
+            noise: self.near.is_none().then(|| self.gradient_noise()),
         });
         let Self { model, cost, coordinates, normal, is_settled, .. } = self;
         Fitted { model, cost, misfits, spread, coordinates, normal, is_settled }

@@ -89,8 +89,9 @@ pub(crate) struct Equations<'a> {
     pub(crate) gradient: &'a [f64],
     /// w of the module documentation.
     pub(crate) weight: f64,
-    /// The first term of G of the module documentation without w^2.
-    pub(crate) noise: DMatrix<f64>,
+    /// The first term of G of the module documentation without w^2; `None` after a rough fit, whose
+    /// C is N^-1.
+    pub(crate) noise: Option<DMatrix<f64>>,
 }
 
 /// Returns the part of one stage in the covariance of A'V^-1 r, which is the first term of G of the
@@ -134,8 +135,10 @@ impl Spread {
             priors[(i, i)] = coordinate.prior(coordinate.read(fit.model)).curvature;
         }
         let inverse = Cholesky::of(ridged).inverse();
-        let gradient = &fit.noise * fit.weight.powi(2) + priors;
-        let mut covariance = &inverse * gradient * &inverse;
+        let mut covariance = match &fit.noise {
+            Some(noise) => &inverse * (noise * fit.weight.powi(2) + priors) * &inverse,
+            None => inverse.clone(),
+        };
         let mut parameters = Vec::new();
         for ((at, (coordinate, _)), x) in fit.coordinates.iter().enumerate().zip(fit.optimum()) {
             let effect = |slot: usize| fit.model.effects[slot].0;

@@ -13,6 +13,7 @@ mod fix;
 mod gauge;
 mod implement;
 mod init;
+mod plan;
 mod predict;
 mod problem;
 mod ranges;
@@ -25,8 +26,8 @@ mod wrap;
 
 pub use black_box::{
     AlteredColumn, Argument, Ask, BlackBox, Checked, Closure, Input, OwnEffect, Parameter,
-    ProblemSpec, RecordedSession, SessionColumn, SessionPart, SessionStage, Source, SourceError,
-    StageEntry, State, TrialFile, closure,
+    PlanEntry, PlanInput, ProblemSpec, RecordedSession, SessionColumn, SessionPart, SessionStage,
+    Source, SourceError, StageEntry, State, TrialFile, closure,
 };
 pub use by_trial::{Apart, ByTrial, Heterogeneity, RunFit, q_values};
 pub use card::{Card, CardColumn, CardOutput, CardRecording};
@@ -39,6 +40,9 @@ pub use fix::{Fix, Fixed, NoFix};
 pub use gauge::{GaugeSetup, GaugeSimulator};
 pub use implement::Implementation;
 pub use init::first_problem;
+pub use plan::{
+    Planned, PlannedRun, Rehearsal, Rehearsed, Shown, plan, plan_with, rehearse, rehearse_with,
+};
 pub use predict::{PAUSE_S, PredictedOutput, PredictedTrial, Prediction, predict, predict_with};
 pub use problem::{Diagnosable, Problem, Reading, name_of};
 pub use ranges::{RangeParameter, RangeSet, Ranges};

@@ -18,6 +18,7 @@ mod invariance;
 mod joints;
 mod keys;
 mod pendulum;
+mod plan;
 mod plant;
 mod predict;
 mod profile;

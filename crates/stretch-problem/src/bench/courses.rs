@@ -1,6 +1,8 @@
 //! Time courses of a signal in shares of its range, for candidate experiments on a gauge and on any
 //! input of a simulator.
 
+use stretch_gap::RandomGenerator;
+
 /// Points of a course: share of the range, and time from the point before, s.
 pub(crate) type Points = Vec<(f64, f64)>;
 
@@ -75,6 +77,56 @@ pub(crate) fn moving() -> Vec<Candidate> {
         ("steps_with_dwells", "Quick steps, each followed by a rest.", begin(&[steps])),
         ("chirp", "Loops over the whole range, ever faster.", begin(&[chirp])),
     ]
+}
+
+/// Candidate experiments that last `seconds` for a simulator whose input crosses its range in `quick_s` at best.
+pub(crate) fn within(seconds: f64, quick_s: f64, random: &mut RandomGenerator) -> Vec<Candidate> {
+    let stair = (1..=LEVELS).map(|level| level as f64 / LEVELS as f64);
+    let dwell_s = seconds / LEVELS as f64 - quick_s;
+    let loops_fast = (0.5 * seconds / quick_s).ceil() as usize;
+    let mut all = vec![
+        (
+            "staircase",
+            "Steps up over the range, each followed by a rest; never back.",
+            stair.flat_map(|level| [(level, quick_s), (level, dwell_s.max(0.0))]).collect(),
+        ),
+        ("slow_loops", "Two slow loops over the range.", loops(0.0, 1.0, 0.25 * seconds, 2)),
+        (
+            "fast_loops",
+            "Loops over the range, as fast as the limits allow.",
+            loops(0.0, 1.0, quick_s, loops_fast),
+        ),
+        (
+            "random_levels",
+            "Random levels, held for random times.",
+            levels(seconds, quick_s, random),
+        ),
+    ];
+    all.extend(
+        moving().into_iter().map(|(name, how, points)| (name, how, lasting(&points, seconds))),
+    );
+    all
+}
+
+/// Random levels, held for random times, that last `seconds`; each move takes `quick_s`.
+pub(crate) fn levels(seconds: f64, quick_s: f64, random: &mut RandomGenerator) -> Points {
+    let mut levels = Points::new();
+    let mut left_s = seconds;
+    while left_s > 0.0 {
+        let (level, held_s) = (random.unit(), 2.0 * quick_s * random.unit());
+        levels.extend([(level, quick_s), (level, held_s)]);
+        left_s -= quick_s + held_s;
+    }
+    levels
+}
+
+/// Levels of a staircase.
+const LEVELS: usize = 5;
+
+/// Returns the points on another time scale, so that they take `seconds`.
+pub(crate) fn lasting(points: &[(f64, f64)], seconds: f64) -> Points {
+    let whole_s: f64 = points.iter().skip(1).map(|(_, seconds)| seconds).sum();
+    points.iter().map(|(share, s)| (*share, s * seconds / whole_s)).collect()
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use stretch_gap::{GapError, Laboratory, Model, Plan, Run, Simulator};
 
 use super::{BlackBox, runs::Altered, source::SourceError};
 use crate::bench::{
-    courses::{course, moving, paced},
+    courses::{course, lasting, moving, paced},
     even_trial,
 };
 
@@ -156,9 +156,7 @@ impl Laboratory for BlackBox {
         let mut candidates = Vec::new();
         for (at, d) in all.iter().enumerate().filter(|(_, d)| d.fastest > 0.0).take(MOVED) {
             for (name, how, points) in moving() {
-                let whole_s: f64 = points.iter().skip(1).map(|(_, seconds)| seconds).sum();
-                let scaled: Vec<(f64, f64)> =
-                    points.iter().map(|(share, s)| (*share, s * lasts_s / whole_s)).collect();
+                let scaled = lasting(&points, lasts_s);
                 let (name, how) = match all.len() {
                     1 => (name.to_owned(), how.to_owned()),
                     _ => (format!("{name} of {}", d.name), format!("{how} By {}.", d.name)),

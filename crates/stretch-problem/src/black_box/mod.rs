@@ -37,7 +37,9 @@ pub use source::{
     SourceError, closure,
 };
 
-pub use spec::{Argument, Input, OwnEffect, Parameter, ProblemSpec, StageEntry, TrialFile};
+pub use spec::{
+    Argument, Input, OwnEffect, Parameter, PlanEntry, PlanInput, ProblemSpec, StageEntry, TrialFile,
+};
 pub use states::State;
 
 /// A checked problem and a source, bound together: a [`Simulator`].

@@ -92,12 +92,14 @@ pub struct ProblemSpec {
     /// The diagnosis does not search for these wrappers. `--fix` writes them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub wrapped: Vec<EffectEntry>,
-    /// The recordings; required unless the simulator is built in.
+    /// The recordings; required unless the simulator is built in, or only `stretch plan` and `stretch rehearse` read the file.
     #[serde(rename = "trial", default, skip_serializing_if = "Vec::is_empty")]
     pub files: Vec<TrialFile>,
     /// What was fitted and how well; `--fix` writes it, and `stretch predict` reads it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub card: Option<Card>,
+    /// Limits of the recordings that `stretch plan` proposes.
+    pub plan: Option<PlanEntry>,
     /// Kinds of effects of the user's own, which `wrap` may name in addition to the kinds of the catalogue.
     #[serde(skip)]
     pub kinds: Vec<&'static Kind>,
@@ -329,6 +331,37 @@ pub struct TrialFile {
     /// `fit`, the default: for fitting; `test`: used only once, for the test at the end.
     #[serde(default, skip_serializing_if = "is_default")]
     pub split: Split,
+}
+
+/// Limits within which `stretch plan` chooses the next recordings. It needs the noise of every stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanEntry {
+    /// Length of one recording, s; a diagnosis of a single recording needs 20 s.
+    pub seconds: f64,
+    /// Sample rate of the recordings, Hz.
+    pub sample_rate_hz: f64,
+    /// Greatest number of recordings; default 2.
+    pub runs: Option<NonZeroUsize>,
+    /// Limits of each input that is not the output of a stage. Every input moves in every recording.
+    #[serde(rename = "input", default)]
+    pub inputs: Vec<PlanInput>,
+}
+
+/// Limits of an input.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PlanInput {
+    /// The column.
+    pub column: String,
+    /// Smallest value.
+    pub low: f64,
+    /// Greatest value.
+    pub high: f64,
+    /// Greatest rate of change, per second.
+    pub fastest: f64,
+    /// Value at the beginning; default: 0, or the limit next to 0.
+    pub rest: Option<f64>,
 }
 
 fn is_default<T: Default + PartialEq>(value: &T) -> bool {

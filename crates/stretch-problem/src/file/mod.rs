@@ -19,6 +19,8 @@ pub(crate) const IN_FOLDER: &str = "problem.toml";
 /// What is wrong with a rig file in the place of a problem's file.
 const RIG: &str = "this file describes a built-in rig or gauge, but a problem file is needed here; to see how much of a new recording \
                    it does not explain, run stretch diagnose NEW --rig with this file";
+/// What is wrong with a problem's file without recordings.
+const NO_TRIAL: &str = "there is no [[trial]]; write one with file for each recording (or, for stretch plan, the table [plan])";
 /// The current folder.
 const HERE: &str = ".";
 
@@ -86,8 +88,8 @@ impl ProblemSpec {
         if simulator.builtin.is_none() && spec.stages.is_empty() {
             return fail("stage", "there is no [[stage]]; write one with output and inputs");
         }
-        if simulator.builtin.is_none() && spec.files.is_empty() {
-            return fail("trial", "there is no [[trial]]; write one with file for each recording");
+        if simulator.builtin.is_none() && spec.files.is_empty() && spec.plan.is_none() {
+            return fail("trial", NO_TRIAL);
         }
         for stage in spec.stages.iter_mut().filter(|stage| stage.name.is_empty()) {
             stage.name.clone_from(&stage.output);
@@ -163,6 +165,9 @@ impl ProblemSpec {
 
     /// As `load`, with other options for reading the recordings.
     pub(crate) fn load_as(&self, options: &ReadOptions) -> Result<Self, ProblemError> {
+        if self.files.is_empty() {
+            return Err(ProblemError::Refused(format!("trial: {NO_TRIAL}")));
+        }
         let mut spec = self.clone();
         for entry in &self.files {
             let recording = Recording::read(self.folder.join(&entry.file), options)?;

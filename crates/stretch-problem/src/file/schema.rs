@@ -76,7 +76,7 @@ pub fn problem_reference() -> String {
 fn table(out: &mut String, root: &Value, schema: &Value, path: &str) {
     let head = match path {
         "" => "At the top".to_owned(),
-        "simulator" | "card" => format!("`[{path}]`"),
+        "simulator" | "card" | "plan" => format!("`[{path}]`"),
         path => format!("`[[{path}]]`"),
     };
     let text = |value: &Value| value.as_str().unwrap_or_default().replace('\n', " ");

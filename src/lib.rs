@@ -17,7 +17,7 @@ use clap::{CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind 
 
 use commands::{
     apply, calibrate, compare, convert, demo, diagnose, effects, evaluate, export, json, listen,
-    page, problem, simulate, sleeve,
+    page, plan, problem, simulate, sleeve,
 };
 use display::Volume;
 
@@ -77,6 +77,8 @@ enum Command {
     Diagnose(diagnose::Args),
     Predict(problem::PredictArgs),
     Init(problem::InitArgs),
+    Plan(plan::PlanArgs),
+    Rehearse(plan::RehearseArgs),
     Effects(effects::Args),
     Listen(listen::Args),
     Export(export::Args),
@@ -151,6 +153,8 @@ pub fn run() -> ExitCode {
         Command::Diagnose(args) => diagnose::run(args).map(|status| done = status),
         Command::Predict(args) => problem::predict(args).map(|status| done = status),
         Command::Init(args) => problem::init(args),
+        Command::Plan(args) => plan::run(args),
+        Command::Rehearse(args) => plan::run_rehearsal(args),
         Command::Effects(args) => effects::run(args),
         Command::Listen(args) => listen::run(args),
         Command::Export(args) => export::run(args),

@@ -283,7 +283,9 @@ fn options(command: &clap::Command) -> usize {
 
 /// A command's help must be short, and the numbers of commands and options must remain small. The
 /// fifteenth command is `compare`, which needs no simulator and no calibration, only two recordings.
-/// Its four options have the names and meanings of those of other commands.
+/// Its four options have the names and meanings of those of other commands. `plan` and `rehearse` need
+/// a simulator and no recordings, so they are no options of `diagnose`. Of their five options, only
+/// `--only` is new.
 #[test]
 fn commands_and_options_are_few_and_a_short_help_fits_a_screen() {
     let program = stretch_cli::command();
@@ -292,7 +294,7 @@ fn commands_and_options_are_few_and_a_short_help_fits_a_screen() {
     let counts: Vec<_> = commands.iter().map(|c| (c.get_name(), options(c))).collect();
     let count: usize = counts.iter().map(|(_, count)| count).sum();
     assert!(
-        counts.len() <= 15 && count <= 95,
+        counts.len() <= 17 && count <= 100,
         "{} commands, {count} options: {counts:?}",
         counts.len()
     );

@@ -16,6 +16,7 @@ pub(crate) mod export;
 pub(crate) mod json;
 pub(crate) mod listen;
 pub(crate) mod page;
+pub(crate) mod plan;
 pub(crate) mod problem;
 mod reading;
 pub(crate) mod shared;

@@ -145,6 +145,12 @@ fn pages_of_how_to_do_something_are_typed() {
 }
 
 #[test]
+#[ignore = "needs python3 with NumPy; ./ci.sh runs it"]
+fn with_numpy_the_page_of_plans_is_typed() {
+    type_page("book/src/how-to/plan.md");
+}
+
+#[test]
 #[ignore = "a diagnosis; ./ci.sh runs it"]
 fn the_page_of_the_json_is_typed() {
     type_page("book/src/reference/diagnosis.md");

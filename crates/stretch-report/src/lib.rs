@@ -17,6 +17,7 @@ mod markup;
 mod memory_figure;
 mod output_table;
 mod page;
+mod plan_page;
 mod predict_page;
 mod script;
 mod signal_figure;
@@ -39,6 +40,7 @@ pub use diagnosis_tables::{
 pub use markup::{percent, plain_number as number, times};
 pub use output_table::output_table;
 pub use page::Table;
+pub use plan_page::{menu_table, plan_page};
 pub use predict_page::{predict_page, predict_table};
 pub use subject::Subject;
 

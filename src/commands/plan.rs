@@ -85,7 +85,7 @@ fn file_name(at: usize) -> String {
 }
 
 fn plan_text(planned: &Planned) -> String {
-    let mut out = format!("\n{}\n\n", table_text(&menu_table(planned)));
+    let mut out = format!("\n{}\n\n", table_text(&menu_table(planned, false)));
     for (at, run) in planned.chosen().enumerate() {
         out += &format!("{}, {}: {}\n", file_name(at), run.name, run.how);
     }

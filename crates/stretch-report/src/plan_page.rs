@@ -26,27 +26,33 @@ pub fn plan_page(planned: &Planned) -> String {
         page.table(&limit_table(&planned.together.limits));
     }
     page.section("The menu", "What each run alone shows.");
-    page.table(&menu_table(planned));
+    page.table(&menu_table(planned, true));
     page.finish()
 }
 
-/// The order in which runs of the menu are recorded, and what each alone shows.
-pub fn menu_table(planned: &Planned) -> Table {
+/// The order in which runs of the menu are recorded, and what each alone shows: the names of the effects that are
+/// confused or not seen, or only their numbers.
+pub fn menu_table(planned: &Planned, has_names: bool) -> Table {
+    let shown = |names: &[String]| match has_names {
+        true => names.join(", "),
+        false => names.len().to_string(),
+    };
     let row = |(at, run): (usize, &PlannedRun)| {
         let order = planned.chosen.iter().position(|chosen| *chosen == at);
         let confused = run.shown.confused().into_iter();
         let confused: Vec<String> =
             confused.map(|(effect, like)| format!("{effect} ({like})")).collect();
+        let hidden: Vec<String> = run.shown.hidden().into_iter().map(str::to_owned).collect();
         vec![
             run.name.clone(),
             order.map_or(String::new(), |order| (order + 1).to_string()),
             run.shown.determined().join(", "),
             run.shown.named().len().to_string(),
-            confused.join(", "),
-            run.shown.hidden().join(", "),
+            shown(&confused),
+            shown(&hidden),
         ]
     };
-    let head = ["Run", "Record as", "Determines", "Effects named", "Confused (with)", "Not seen"];
+    let head = ["Run", "Record as", "Determines", "Effects named", "Confused", "Not seen"];
     let rows = planned.runs.iter().enumerate().map(row);
     Table::new("What each run of the menu alone shows", &head, rows)
 }

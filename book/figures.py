@@ -1,8 +1,12 @@
-"""Draws the figures of the how-to pages into book/src/how-to. Needs the installed package stretch_gap and matplotlib.
+"""Draws the figures of the how-to pages into book/src/how-to. Needs the installed packages stretch_gap, matplotlib and
+mujoco, and the program stretch.
 
 python book/figures.py
 """
 
+import re
+import subprocess
+import tempfile
 from pathlib import Path
 
 import matplotlib
@@ -112,9 +116,64 @@ def compare():
     print(found.sentence)
 
 
+def plan():
+    page = (PAGES / "plan.md").read_text(encoding="utf-8")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, language in (("servo.py", "python"), ("problem.toml", "toml")):
+            text = re.search(f"```{language}\n(.*?)```", page, re.DOTALL)[1]
+            Path(folder, name).write_text(text, encoding="utf-8")
+        subprocess.run(["stretch", "plan", "problem.toml", "--out", "runs", "-q"], cwd=folder, check=True)
+        figure, axes = plt.subplots(2, 1, figsize=(5.2, 3.2), sharex=True)
+        for number, own in enumerate(axes, 1):
+            time_s, command_v = np.loadtxt(Path(folder, "runs", f"run_{number}.csv"), delimiter=",", skiprows=1).T
+            own.plot(time_s, command_v, lw=1)
+            own.set(ylabel="command, V", title=f"run_{number}.csv")
+        axes[-1].set(xlabel="time, s")
+        figure.tight_layout()
+        save(figure, "plan")
+
+
+def formats():
+    import mujoco
+    import stretch_gap.mujoco
+
+    model = """<mujoco><option integrator="implicitfast"/><worldbody><body>
+        <joint name="elbow" axis="0 1 0" armature="0.02"/><geom type="capsule" fromto="0 0 0 0 0 -0.3" size="0.02" mass="0.5"/>
+        </body></worldbody><actuator><position name="motor" joint="elbow" kp="20" kv="1"/></actuator></mujoco>"""
+    command = 0.3 * np.sin(1.5 * TIME_S) + 0.1 * np.sin(5 * TIME_S)
+
+    def simulated(text):
+        compiled = mujoco.MjModel.from_xml_string(text)
+        data, position = mujoco.MjData(compiled), np.empty(TIME_S.size)
+        for i, data.ctrl[0] in enumerate(command):
+            position[i] = data.qpos[0]
+            mujoco.mj_step(compiled, data, round(DT_S / compiled.opt.timestep))
+        return position
+
+    seen = simulated(model.replace("armature", 'frictionloss="1.2" armature'))
+    seen = seen + np.random.default_rng(0).normal(scale=1e-3, size=seen.size)
+    problem = stretch_gap.mujoco.problem(model, {"time_s": TIME_S, "elbow_cmd_rad": command, "elbow_rad": seen})
+    found = problem.diagnose(wrap=None)
+    print(found.sentence, found.apply(problem.spec))
+    problem.spec.compile()
+    figure, axes = plt.subplots(figsize=(5.2, 2.6))
+    shown = slice(200, 500)
+    for values, label, style in (
+        (seen, "recording", "k"),
+        (simulated(model), "model", "0.6"),
+        (simulated(problem.spec.to_xml()), "fixed model", "C0--"),
+    ):
+        axes.plot(TIME_S[shown], values[shown], style, lw=1, label=label)
+    axes.set(xlabel="time, s", ylabel="position, rad")
+    axes.legend(frameon=False, ncols=3, loc="lower left", bbox_to_anchor=(0, 1))
+    save(figure, "formats")
+
+
 if __name__ == "__main__":
     found = diagnosed()
     print(found.sentence)
     ranges(found)
     card(found)
     compare()
+    plan()
+    formats()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
 import stretch_gap
@@ -131,6 +133,45 @@ def test_a_late_command_of_one_of_two_joints_becomes_its_actuators_delay():
     for _ in range(40):
         mujoco.mj_step(model, data)
     assert before < 1e-3 < abs(data.qpos[0])
+
+
+@pytest.mark.parametrize("place", ["input", "output"])
+def test_a_delay_that_was_written_into_the_model_is_no_longer_missing(place):
+    asked = commands(["elbow"])
+    asked["elbow"] *= np.minimum(np.arange(asked["elbow"].size) / RATE_HZ, 1.0)  # from rest
+    seen = measured(ONE, lambda spec: None, asked, late=4 if place == "input" else 0)
+    if place == "output":
+        seen["elbow"] = np.concatenate([np.repeat(seen["elbow"][0], 4), seen["elbow"][:-4]])
+    data = recording(asked, seen)
+    problem = stretch_gap.mujoco.problem(ONE, data)
+    # The values of this model are exact. A larger inertia with less damping would look much like a delay.
+    found = problem.diagnose(wrap=[f"{place}.delay", "output.backlash"], parameters={})
+    assert found.named == [f"{place}.delay"]
+    if not hasattr(problem.spec.actuators[0], "delay"):
+        pytest.skip("SKIPPED: this MuJoCo has no delays")
+    assert found.apply(problem.spec) == []
+    problem.spec.compile()
+    again = stretch_gap.mujoco.problem(problem.spec.to_xml(), data).diagnose(
+        wrap=["input.delay", "output.delay", "output.backlash"]
+    )
+    assert again.named == [] and again.verdict in ("no_gap", "parameters"), again.sentence
+
+
+def test_a_friction_is_written_into_urdf_and_sdf(rubbing):
+    _, found = rubbing
+    elbow = "<joint name='elbow' type='revolute'><dynamics damping='0.1'/></joint>"
+    urdf = ElementTree.fromstring(f"<robot name='arm'>{elbow}<joint name='wrist' type='fixed'/></robot>")
+    left = found.apply(urdf)
+    dynamics = urdf.find("joint[@name='elbow']/dynamics")
+    assert float(dynamics.get("friction")) == pytest.approx(0.6, rel=0.1) and dynamics.get("damping") == "0.1"
+    assert {"elbow_kp", "elbow_kv", "elbow_armature"} == set(left)  # URDF has no servo and no armature
+    sdf = ElementTree.fromstring("<sdf version='1.9'><model name='arm'><joint name='elbow' type='revolute'/></model></sdf>")
+    assert found.apply(sdf) == left
+    assert float(sdf.find(".//joint/axis/dynamics/friction").text) == pytest.approx(0.6, rel=0.1)
+    with pytest.raises(stretch_gap.StretchError, match="no joint elbow; the joints are wrist"):
+        found.apply(ElementTree.fromstring("<robot><joint name='wrist' type='fixed'/></robot>"))
+    with pytest.raises(stretch_gap.StretchError, match="<html> is no description of a robot"):
+        found.apply(ElementTree.fromstring("<html/>"))
 
 
 def told(match, **change):

@@ -480,22 +480,22 @@ class Diagnosis:
         )
 
     def apply(self, spec: Any) -> list[str]:
-        """Write the result into a MuJoCo specification, for a diagnosis of a `stretch_gap.mujoco.problem`.
+        """Write the result into a MuJoCo specification, a URDF or an SDF. `stretch_gap.mujoco.apply` describes what is written.
 
         Parameters
         ----------
-        spec : mujoco.MjSpec
-            Specification of the model, usually `problem.spec`. It is changed in place.
+        spec : mujoco.MjSpec or xml.etree.ElementTree.Element
+            Specification of the model, usually `problem.spec`, or the root element of a URDF or an SDF. It is changed in place.
 
         Returns
         -------
         list of str
-            Named effects that a specification cannot represent. `fix().code` contains functions for them.
+            Parameters and named effects that the description cannot represent. `fix().code` contains functions for the effects.
 
         Raises
         ------
         StretchError
-            If the specification does not contain a joint or an actuator of the problem.
+            If the description does not contain a joint or an actuator of the diagnosis, or is of another kind.
 
         Examples
         --------

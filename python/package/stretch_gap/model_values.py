@@ -1,4 +1,4 @@
-"""Values of joints and actuators of a MuJoCo model: read and set in a compiled model, and written into a specification."""
+"""Values of joints and actuators in a compiled MuJoCo model, and their way into its specification, a URDF or an SDF."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ GAIN = "kp"
 RATE_GAIN = "kv"
 DOF = ("damping", "armature", "frictionloss")
 """Values of a joint. A compiled model stores them as `dof_NAME`, a specification as `NAME`."""
+SENSOR = "{}_measured"
+"""Name of the sensor of a joint that shows what the recording shows."""
 UNITS = {"damping": "N m s/rad", "armature": "kg m^2", "frictionloss": "N m", GAIN: "N m/rad", RATE_GAIN: "N m s/rad"}
 
 
@@ -45,42 +47,79 @@ def read(model: Any, owner: str, what: str) -> float:
 
 
 def apply(diagnosis: Diagnosis, spec: Any) -> list[str]:
-    """Write the result of a diagnosis into a MuJoCo specification.
+    """Write the result of a diagnosis into the description of a robot: a MuJoCo specification, a URDF or an SDF.
 
-    Parameters and effects of joints and actuators are written as values of the specification. A delay of a command becomes the
-    delay of its actuator if this version of MuJoCo supports it.
+    Values whose names are a joint or an actuator and a quantity, such as `elbow_damping`, are written into the description. The
+    quantities are `damping`, `frictionloss` and, in MuJoCo only, `armature`, `kp` and `kv`. In MuJoCo, a delay of a command
+    becomes the delay of its actuator, and a delay of a measured position becomes a sensor `JOINT_measured` with this delay, if
+    this version of MuJoCo supports it. The sensor shows what the recording shows, and `problem` reads it in place of the joint.
 
     Parameters
     ----------
     diagnosis : Diagnosis
-        Diagnosis of a `problem`.
-    spec : mujoco.MjSpec
-        Specification of the model, usually `problem.spec`. It is changed in place.
+        Diagnosis of a `problem`, or of a simulator of your own with parameters and effects of such names.
+    spec : mujoco.MjSpec or xml.etree.ElementTree.Element
+        Specification of the model, usually `problem.spec`, or the root element of a URDF (`<robot>`) or an SDF (`<sdf>`). It is
+        changed in place.
 
     Returns
     -------
     list of str
-        Named effects that a specification cannot represent. `diagnosis.fix().code` contains functions for them.
+        Parameters and named effects that the description cannot represent. `diagnosis.fix().code` contains functions for the
+        effects.
 
     Raises
     ------
     StretchError
-        If the specification does not contain a joint or an actuator of the problem.
+        If the description does not contain a joint or an actuator of the diagnosis, or is of another kind.
 
     Examples
     --------
-    >>> left = stretch_gap.mujoco.apply(found, problem.spec)  # doctest: +SKIP
+    >>> from xml.etree import ElementTree
+    >>> robot = ElementTree.fromstring("<robot name='arm'><joint name='elbow' type='revolute'/></robot>")
+    >>> left = stretch_gap.mujoco.apply(found, robot)  # doctest: +SKIP
     """
-    own = {name: next(iter(values.values())) for name, values in diagnosis.effects.items() if _owner(spec, name) and values}
-    for name, value in {**diagnosis.parameters, **own}.items():
+    own = {name: next(iter(values.values())) for name, values in diagnosis.effects.items() if parts(name)[0] and values}
+    values = {**diagnosis.parameters, **own}
+    if hasattr(spec, "tag"):
+        left = [name for name, value in values.items() if not _described(spec, name, value)]
+        return left + [name for name in diagnosis.effects if name not in own]
+    for name, value in values.items():
         found = _owner(spec, name)
         if found is None:
             owner, what = parts(name)
             kind = "joint" if what in DOF else "actuator"
             raise StretchError(f"{name}: the specification has no {kind} {owner}; give that of the problem (problem.spec)")
         _write_spec(found, parts(name)[1], value)
-    left = [name for name in diagnosis.effects if name not in own]
-    return [name for name in left if not _delayed(diagnosis, spec, name)]
+    return [name for name in diagnosis.effects if name not in own and not _delayed(diagnosis, spec, name)]
+
+
+def _described(root: Any, name: str, value: float) -> bool:
+    """Write a value into a URDF or an SDF. Return False if the format has no place for it."""
+    if root.tag not in ("robot", "sdf"):
+        raise StretchError(f"<{root.tag}> is no description of a robot; give the root of a URDF (<robot>) or an SDF (<sdf>)")
+    owner, what = parts(name)
+    key = {"damping": "damping", "frictionloss": "friction"}.get(what)
+    if key is None:
+        return False
+    joints = {joint.get("name"): joint for joint in root.iter("joint") if joint.get("type")}
+    if owner not in joints:
+        raise StretchError(f"{name}: there is no joint {owner}; the joints are {', '.join(map(str, joints))}")
+    joint = joints[owner]
+    if root.tag == "robot":
+        _child(joint, "dynamics").set(key, f"{value:.6g}")
+    else:
+        _child(_child(_child(joint, "axis"), "dynamics"), key).text = f"{value:.6g}"
+    return True
+
+
+def _child(parent: Any, tag: str) -> Any:
+    """Return the first child with this tag; append one if there is none."""
+    found = parent.find(tag)
+    if found is None:
+        found = parent.makeelement(tag, {})
+        parent.append(found)
+    return found
 
 
 def _owner(spec: Any, name: str) -> Any:
@@ -103,17 +142,25 @@ def _write_spec(owner: Any, what: str, value: float) -> None:
 
 
 def _delayed(diagnosis: Diagnosis, spec: Any, name: str) -> bool:
-    """Write the delay of a command as the delay of its actuator. Return False if the effect is not such a delay."""
+    """Write the delay of a command or of a measured position. Return False if the effect is not such a delay."""
     place, _, kind = name.rpartition(".")
     joints = {joint.name for joint in spec.joints}
     joint = next((part for part in place.split(".") if part in joints), None)
     if joint is None and len(spec.actuators) == 1:
         joint = spec.actuators[0].target
     own = [actuator for actuator in spec.actuators if actuator.target == joint]
-    if kind != "delay" or "output" in place or len(own) != 1 or not hasattr(own[0], "delay"):
+    if kind != "delay" or len(own) != 1 or not hasattr(own[0], "delay"):
         return False
-    # MuJoCo rounds a delay up to whole steps, and a delay that is longer by an error of the fit would act a step too late
-    steps = max(1, round(diagnosis.effects[name]["delay_s"] / spec.option.timestep))
-    own[0].delay = (steps - 0.5) * spec.option.timestep
-    own[0].nsample = steps + 2
+    # MuJoCo rounds a delay up to whole steps, and a delay that is longer by an error of the fit would act a step too late.
+    step_s = spec.option.timestep
+    steps = max(1, round(diagnosis.effects[name]["delay_s"] / step_s))
+    delayed = own[0]
+    if "output" in place:
+        import mujoco  # type: ignore[import-untyped,import-not-found,unused-ignore]
+
+        delayed = spec.add_sensor(name=SENSOR.format(joint), type=mujoco.mjtSensor.mjSENS_JOINTPOS, objname=joint)
+        delayed.objtype = mujoco.mjtObj.mjOBJ_JOINT
+        steps -= 1  # after a step, a sensor shows the position before it
+    delayed.delay = (steps - 0.5) * step_s
+    delayed.nsample = steps + 2
     return True

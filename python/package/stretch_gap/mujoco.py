@@ -50,7 +50,7 @@ import numpy as np
 from . import problem as entries
 from ._stretch import StretchError
 from .joints import Joint, found, require_commands, trials
-from .model_values import DOF, GAIN, RATE_GAIN, UNITS, apply, parts, read, write
+from .model_values import DOF, GAIN, RATE_GAIN, SENSOR, UNITS, apply, parts, read, write
 from .recordings import Array
 
 if TYPE_CHECKING:
@@ -193,11 +193,13 @@ class Simulator:
         data = [mujoco.MjData(self.model) for _ in range(min(count, os.cpu_count() or 1))]
         for part in trials:
             state, control = self._begun(mujoco, count, inputs, part.samples)
-            states, _ = mujoco.rollout.rollout(models, data, state, control)
+            states, sensors = mujoco.rollout.rollout(models, data, state, control)
             for joint in self.joints:
                 at = 1 + int(self.model.jnt_qposadr[self.model.joint(joint.name).id])
                 out[joint.measured][:, part.samples.start] = state[:, at] / joint.scale
-                rest = states[:, self.steps - 1 :: self.steps, at][:, : part.samples.stop - part.samples.start - 1]
+                sensor = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SENSOR, SENSOR.format(joint.name))
+                shown = states[:, :, at] if sensor < 0 else sensors[:, :, self.model.sensor_adr[sensor]]
+                rest = shown[:, self.steps - 1 :: self.steps][:, : part.samples.stop - part.samples.start - 1]
                 out[joint.measured][:, part.samples.start + 1 : part.samples.stop] = rest / joint.scale
         broken = [i for i in range(count) if not all(np.isfinite(x[i]).all() for x in out.values())]
         for i in broken:  # NaN excludes the model from the fit.
@@ -218,9 +220,22 @@ class Simulator:
             moved = np.repeat(joint.scale * inputs[joint.commanded][:, span], self.steps, axis=1)
             control[:, :, self.model.actuator(joint.actuator).id] = moved
         kind = mujoco.mjtState.mjSTATE_FULLPHYSICS
-        state = np.empty(mujoco.mj_stateSize(self.model, kind))
-        mujoco.mj_getState(self.model, start, state, kind)
-        return np.repeat(state[np.newaxis], count, 0), np.ascontiguousarray(control)
+        states = np.empty((count, mujoco.mj_stateSize(self.model, kind)))
+        for row, state in enumerate(states):
+            self._fill_history(mujoco, start, control[row, 0])
+            mujoco.mj_getState(self.model, start, state, kind)
+        return states, np.ascontiguousarray(control)
+
+    def _fill_history(self, mujoco: Any, start: Any, control: Array) -> None:
+        """Let delays of the model begin with the first command and the first position, as a machine at rest does."""
+        for joint in self.joints if getattr(self.model, "nhistory", 0) else ():
+            actuator = self.model.actuator(joint.actuator).id
+            sensor = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_SENSOR, SENSOR.format(joint.name))
+            if count := int(self.model.actuator_history[actuator, 0]):
+                mujoco.mj_initCtrlHistory(self.model, start, actuator, None, np.full((count, 1), control[actuator]))
+            if sensor >= 0 and (count := int(self.model.sensor_history[sensor, 0])):
+                at = int(self.model.jnt_qposadr[self.model.joint(joint.name).id])
+                mujoco.mj_initSensorHistory(self.model, start, sensor, None, np.full((count, 1), start.qpos[at]), 0.0)
 
 
 @dataclass

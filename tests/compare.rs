@@ -113,6 +113,21 @@ fn other_rates_and_clocks_are_aligned() {
     assert!(later["notes"].to_string().contains("the clocks share no time"), "{}", later["notes"]);
 }
 
+/// A shift by a whole period of the motion explains a delay as well as the delay itself.
+#[test]
+fn periodic_motions_keep_their_clock() {
+    let turn = |t: f64| 20.0 * (t / 0.7).sin() + 10.0 * (t / 0.35 + 1.0).sin();
+    for hz in [100.0, 40.0] {
+        let scratch = Scratch::new();
+        log(&scratch, "a.csv", USUAL, &turn);
+        log(&scratch, "b.csv", ("knee_deg", hz, 0.0), &|t| turn(t - 0.0065));
+        let files = ["a.csv", "b.csv"].map(|f| scratch.path(f));
+        let text = prints(stretch().arg("compare").arg("--json").args(files));
+        let answer: Value = serde_json::from_str(&text).expect("JSON");
+        holds(&answer, "delay_s", 0.0065, 0.003);
+    }
+}
+
 #[test]
 fn the_same_file_twice_is_equal_and_a_low_pass_is_named() {
     let scratch = Scratch::new();

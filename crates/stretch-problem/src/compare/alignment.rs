@@ -122,10 +122,14 @@ pub(super) fn aligned(
     let far_s = b.time_s[0] - a.time_s[0] + Likeness::best(pairs, COARSE / 2).lag * coarse_s;
     let given = look(base_s, LATE.0);
     let far = look(far_s, LATE.0.max(2.0 * coarse_s));
-    let is_far = (far_s - base_s - given.lag * dt_s).abs() > LATE.0;
+    let by_s = far_s - base_s - given.lag * dt_s;
+    // Columns of one file have one clock.
+    let is_far = by_s.abs() > LATE.0 && a.name != b.name;
+    let lag = (by_s.abs() / coarse_s).round() as usize;
+    let is_repeated = || columns.iter().all(|[x, _]| is_repeated(&thinned(a, x), lag));
     let is_better = 1.0 - far.r.abs() < BETTER * (1.0 - given.r.abs());
     let is_long = common_s(a, b, far_s) > 0.5 * a.duration_s().min(b.duration_s());
-    let (mut shift_s, best) = match is_far && is_better && is_long {
+    let (mut shift_s, best) = match is_far && is_better && is_long && !is_repeated() {
         true => (far_s - base_s, far),
         false => (0.0, given),
     };
@@ -141,6 +145,18 @@ pub(super) fn aligned(
         ));
     }
     Ok((shift_s, notes))
+}
+
+/// Whether a motion resembles itself after this many samples, and less in between. A shift by such a
+/// time would be a guess, because the motion looks the same without it.
+fn is_repeated(x: &[f64], samples: usize) -> bool {
+    let like = |k: usize| {
+        let (start, rest) = (x.get(..x.len().saturating_sub(k)), x.get(k..));
+        let found = lag(start.unwrap_or(&[]), rest.unwrap_or(&[]), 0);
+        found.map_or(0.0, |found| found.correlation_at_zero)
+    };
+    let there = like(samples);
+    there > NEAR && (1..samples).any(|k| like(k) < NEAR * there)
 }
 
 /// Both recordings at the sample times of the slower one, in the time in which both were recorded.

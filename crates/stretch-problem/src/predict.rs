@@ -166,8 +166,10 @@ pub fn predict(
     // Others have the card, but not the recordings that were fitted.
     let is_alone =
         file.card.is_some() && file.files.iter().any(|one| !file.folder.join(&one.file).exists());
-    let files = if is_alone { Vec::new() } else { file.files.clone() };
-    let mut spec = ProblemSpec { files, ..file.clone() }.load()?;
+    let mut spec = match is_alone {
+        true => ProblemSpec { files: Vec::new(), ..file.clone() },
+        false => file.load()?,
+    };
     let fitted = spec.trials.len();
     for path in new {
         let mut trial = SessionTrial::from(Recording::read(path, &file.reading())?);

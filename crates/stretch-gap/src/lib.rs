@@ -24,6 +24,7 @@ pub use evidence::{
     detection_limit::DetectionLimit,
     gathered::{Evidence, Excess, StageEvidence},
     localise::location::{SliceGap, StageGap, StageShare, Where},
+    probability::covering,
     responses::{Answered, Response, Responses},
     shares::EffectShare,
     stability::EffectStability,

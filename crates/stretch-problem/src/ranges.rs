@@ -5,12 +5,11 @@ use std::collections::BTreeMap;
 use schemars::JsonSchema;
 use serde::Serialize;
 use stretch_effects::EffectParameter;
-use stretch_gap::{Candidate, Description, Diagnosis, Evidence, Known, Model, Place, Spread};
+use stretch_gap::{
+    Candidate, Description, Diagnosis, Evidence, Known, Model, Place, Spread, covering,
+};
 
 use crate::fix::{Chosen, NoFix};
-
-/// Share of the probability that the sets of effects hold together.
-const COVERED: f64 = 0.95;
 
 /// Joint distribution of the re-tuned parameters and of the parameters of missing effects.
 ///
@@ -75,13 +74,9 @@ impl Ranges {
             return Ok(Self { sets: vec![RangeSet::of(&[], 1.0, (model, spread), description)] });
         }
         let fits = evidence.candidates.iter().zip(&evidence.candidate_spreads);
-        let mut sum = 0.0;
-        let kept = diagnosis.candidates.iter().zip(fits).take_while(|(candidate, _)| {
-            let is_kept = sum < COVERED;
-            sum += candidate.probability;
-            is_kept
-        });
-        let kept: Vec<_> = kept.collect();
+        let probabilities = diagnosis.candidates.iter().map(|c| c.probability);
+        let held = covering(&probabilities.collect::<Vec<_>>());
+        let kept: Vec<_> = diagnosis.candidates.iter().zip(fits).take(held).collect();
         let total: f64 = kept.iter().map(|(candidate, _)| candidate.probability).sum();
         let one = |(candidate, fit): &(&Candidate, (&Model, &Spread))| {
             let probability = candidate.probability / total;

@@ -238,7 +238,11 @@ impl Posterior {
 }
 
 /// Returns how many of the probabilities, which are in descending order, make up 95 % of their sum.
-pub(crate) fn covering(probabilities: &[f64]) -> usize {
+///
+/// ```
+/// assert_eq!(stretch_gap::covering(&[0.7, 0.2, 0.08, 0.02]), 3);
+/// ```
+pub fn covering(probabilities: &[f64]) -> usize {
     let all: f64 = probabilities.iter().sum();
     let mut sum = 0.0;
     let held = probabilities.iter().take_while(|p| {
